@@ -44,13 +44,20 @@ class Synthetic:
     light: Literal["studio", "warm"] = "studio"
     """Neutral lamps (`studio`), or warm lamps from the other side (`warm`); the light becomes
     part of the recorded colours."""
-    motion: Literal["showcase", "talk", "walk", "sway"] = "talk"
+    motion: Literal["showcase", "talk", "walk", "sway", "repertoire"] = "talk"
     """What a whole person does: `talk` stands and gestures in turn; `walk` walks in place;
+    `repertoire` takes hands, head and chest through what they do in conversations, and walks;
     `showcase` stands calmly, gestures and moves fast, a third of the time each; `sway` does the
     same and turns the hips."""
     garment: Literal["none", "skirt"] = "none"
     """What a whole person wears over the clothes: a `skirt` hangs, folds and swings, and the
     arms keep off it."""
+    clothes: Literal["plain", "patterned"] = "plain"
+    """What the person wears: a knitted jumper, jeans and leather shoes (`plain`), or prints that
+    show from metres away (`patterned`), for tests of tracking."""
+    gaze: Literal["visitor", "ahead"] = "visitor"
+    """Where the person looks between glances: at who stands before the first camera, whatever the
+    head does (`visitor`), or where the head points (`ahead`)."""
     seed: int = 0
     """Seed of voice, order of sentences, blinks, brows, sway, gestures and choice of cameras."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -88,6 +95,8 @@ class Synthetic:
             self.light,
             self.motion,
             self.garment,
+            self.clothes,
+            self.gaze,
         )
         record(recording, self.out, self.workers)
         say(f"{self.frames} frames by {self.cameras} cameras lie in {self.out}")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ico3d.studio.person.strands import Strands
 from ico3d.studio.person.subject import CARDS, Material, Subject
 
 DENSITY = {
@@ -17,23 +18,32 @@ DENSITY = {
 }
 """Points per area relative to skin and hair: small moving parts need more."""
 FACE_DENSITY = 3.0
+HAIRS = 0.25
+"""Share of the points that lie on strands of hair."""
 
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """P points that stick to a mesh.
+    """P points that stick to a mesh and its hair.
 
     Attributes:
-        corners: (P, 3) int vertices of the triangle that holds each point.
-        parts: (P, 3) float64 barycentric weights of the vertices.
+        corners: (Q, 3) int vertices of the triangle that holds each of the first Q points.
+        parts: (Q, 3) float64 barycentric weights of the vertices.
+        strands: Hair that holds the other points, or None.
+        chosen: (P - Q,) int points of the strands.
     """
 
     corners: np.ndarray
     parts: np.ndarray
+    strands: Strands | None
+    chosen: np.ndarray
 
     def on(self, vertices: np.ndarray) -> np.ndarray:
         """(P, 3) float32 positions of the points on a mesh with vertices (V, 3)."""
-        return np.einsum("pk,pkc->pc", self.parts, vertices[self.corners]).astype(np.float32)
+        places = np.einsum("pk,pkc->pc", self.parts, vertices[self.corners]).astype(np.float32)
+        if self.strands is None:
+            return places
+        return np.concatenate([places, self.strands.on(vertices)[self.chosen]])  # (P, 3)
 
 
 def surface_points(subject: Subject, count: int, seed: int) -> SurfacePoints:
@@ -51,10 +61,15 @@ def surface_points(subject: Subject, count: int, seed: int) -> SurfacePoints:
     sides = corners[:, 1:] - corners[:, :1]  # (F, 2, 3)
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)  # (F,)
     weight = area * _density(subject, faces, materials)
-    chosen = random.choice(len(faces), size=count, p=weight / weight.sum())
-    u, v = random.random((2, count, 1))
+    hairs = 0 if subject.strands is None else round(HAIRS * count)
+    chosen = random.choice(len(faces), size=count - hairs, p=weight / weight.sum())
+    u, v = random.random((2, count - hairs, 1))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    return SurfacePoints(faces[chosen], np.concatenate([1 - u - v, u, v], axis=1))
+    parts = np.concatenate([1 - u - v, u, v], axis=1)
+    held = 1 if subject.strands is None else len(subject.strands.offsets)
+    return SurfacePoints(
+        faces[chosen], parts, subject.strands, random.choice(held, size=hairs, replace=hairs > held)
+    )
 
 
 def _density(subject: Subject, faces: np.ndarray, materials: np.ndarray) -> np.ndarray:

@@ -21,15 +21,16 @@ from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
 from ico3d.errors import SettingsError
 from ico3d.studio.acting.embody import embodied
+from ico3d.studio.acting.gaze import GAZES, looking
 from ico3d.studio.acting.gestures import MOTIONS
 from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
 from ico3d.studio.dress.wearing import GARMENTS, dressed
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.subject import Subject
-from ico3d.studio.picture.lighting import STUDIOS
+from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.points import surface_points
-from ico3d.studio.rigs import RIGS, cameras_of
-from ico3d.studio.studio import Studio, backdrop
+from ico3d.studio.rigs import BODY_DISTANCE, DISTANCE, RIGS, cameras_of
+from ico3d.studio.studio import CLOTHES, Studio, backdrop
 
 POINTS = 6000
 BODY_POINTS = 4000
@@ -56,6 +57,8 @@ class Recording:
         light: Lights, one of `STUDIOS`.
         motion: What a whole person does, one of `MOTIONS`.
         garment: Swinging garment that a whole person wears over the clothes, one of `GARMENTS`.
+        clothes: What the person wears, one of `CLOTHES`.
+        gaze: Where the person looks between glances, one of `GAZES`.
     """
 
     subject: str
@@ -71,6 +74,8 @@ class Recording:
     light: str
     motion: str
     garment: str = "none"
+    clothes: str = "plain"
+    gaze: str = "ahead"
 
     @property
     def whole(self) -> bool:
@@ -105,6 +110,9 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         clear = recording.arms_clear
         acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed, clear)
         subject, acted = dressed(subject, acted, recording.garment, recording.fps)
+    if recording.gaze == "visitor":
+        ahead = BODY_DISTANCE if recording.whole else DISTANCE
+        acted = looking(subject, acted, subject.head_in_world + np.array([0.0, 0.0, ahead]))
     cameras = cameras_of(subject, recording.rig, recording.cameras, recording.size)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
@@ -116,14 +124,22 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         _write_png(out / "backgrounds" / f"{camera.name}.png", image)
     _write_sound(out / "audio.wav", acted.samples)
     _write_frames(out / "frames.safetensors", subject, acted, views, recording.seed)
-    _draw(Studio(subject, lamps), acted, cameras, backdrops, views, out, workers)
+    studio = Studio(subject, lamps, recording.clothes)
+    _draw(studio, acted, cameras, backdrops, views, out, workers)
     # Last: a folder with capture.json is complete.
     _write_json(out / "capture.json", recording, subject, acted, cameras)
     (out / UNFINISHED).unlink()
 
 
 def _check(recording: Recording) -> None:
-    choices = {"rig": RIGS, "light": tuple(STUDIOS), "motion": MOTIONS, "garment": GARMENTS}
+    choices = {
+        "rig": RIGS,
+        "light": tuple(STUDIOS),
+        "motion": MOTIONS,
+        "garment": GARMENTS,
+        "clothes": CLOTHES,
+        "gaze": GAZES,
+    }
     for name, known in choices.items():
         value = getattr(recording, name)
         if value not in known:

@@ -3,37 +3,57 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ico3d.common.camera import Camera
+from ico3d.splat.cpu.compile import kernel
+from ico3d.studio.dress.tailoring import tailored
 from ico3d.studio.person.subject import CARDS, Subject
-from ico3d.studio.picture.lighting import BUST, WHOLE, Lamps, Lights, lights_on
+from ico3d.studio.picture.eyeball import eye_rows
+from ico3d.studio.picture.fibres import overlay, strand_colors
+from ico3d.studio.picture.lamps import Lamps
+from ico3d.studio.picture.lighting import Lights, lights_on
 from ico3d.studio.picture.materials import Colors
+from ico3d.studio.picture.occlusion import Sky
 from ico3d.studio.picture.paint import lip_gap, paint
-from ico3d.studio.picture.shader import Scene, display, shade, shade_cards
+from ico3d.studio.picture.shader import Scene, shade
+from ico3d.studio.picture.shadows import BUST, WHOLE
 from ico3d.studio.picture.textures import noise
+from ico3d.studio.picture.tones import developed, display
 from ico3d.studio.raster import empty_buffers, rasterise, to_screen, vertex_normals
 
+CLOTHES = ("plain", "patterned")
+"""A knitted jumper, jeans and leather shoes; or prints that show from metres away."""
 SUPERSAMPLING = 3
+GLOW = (0.62, 0.62, 0.5)
+"""Light on the cloth behind the person: at the edges, what the middle has more, and how wide that
+is as a share of the picture."""
+BODY_MAP = (320, 1.1)
+"""Depth maps of a whole person for occlusion: texels along the side, and half of it in metres."""
+BODY_DIRECTIONS = 40
+NECK, NECK_BLEND = -0.2, 0.06
+"""Height in metres below which occlusion of a whole person is that of the pose, and the height
+above it within which that of the head takes over."""
 
 
 def backdrop(camera: Camera, lamps: Lamps) -> np.ndarray:
-    """(H, W, 3) float32 picture of a mottled grey cloth far behind the person."""
+    """(H, W, 3) float32 picture of a mottled grey cloth behind the person, lit in the middle."""
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)  # (H, W, 3)
     rays = pixels @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    return _cloth_backdrop(rays.astype(np.float32), lamps.cloth)
+    middle = pixels[..., :2] / (camera.width, camera.height) - (0.5, 0.45)
+    glow = GLOW[0] + GLOW[1] * np.exp(-((middle / GLOW[2]) ** 2).sum(axis=-1))  # (H, W)
+    return _cloth_backdrop(rays.astype(np.float32), glow.astype(np.float32), lamps.cloth)
 
 
-@njit(cache=True, nogil=True)
-def _cloth_backdrop(rays, tint):
+@kernel(fast=False)
+def _cloth_backdrop(rays, glow, tint):
     out = np.empty(rays.shape, np.float32)
     for i in range(rays.shape[0]):
         for j in range(rays.shape[1]):
             x, y, z = rays[i, j, 0], rays[i, j, 1], rays[i, j, 2]
             mottle = noise(3 * x, 3 * y, 3 * z) + 0.5 * noise(9 * x + 5, 9 * y, 9 * z)
-            value = 0.16 + 0.10 * mottle + 0.22 * (y + 0.1)
+            value = glow[i, j] * (0.16 + 0.10 * mottle + 0.22 * (y + 0.1))
             out[i, j, 0] = display(tint[0] * value)
             out[i, j, 1] = display(tint[1] * value)
             out[i, j, 2] = display(tint[2] * value)
@@ -48,26 +68,36 @@ class Figure:
         scene: The posed person in canonical head space.
         lights: The studio's lights in canonical head space.
         world_from_head: (4, 4) pose of the head.
+        strands: (M, 3) float32 points of the hair's strands in canonical head space, metres; None
+            for a person without strands.
     """
 
     scene: Scene
     lights: Lights
     world_from_head: np.ndarray
+    strands: np.ndarray | None
 
 
 class Studio:
     """Draws pictures of one person."""
 
-    def __init__(self, subject: Subject, lamps: Lamps):
-        """Computes the person's painted values, which takes about a second."""
+    def __init__(self, subject: Subject, lamps: Lamps, clothes: str = "plain"):
+        """Computes the person's painted values, which takes about a second.
+
+        Args:
+            subject: The person.
+            lamps: How the studio is lit.
+            clothes: One of `CLOTHES`.
+        """
         self.subject = subject
         self._lamps = lamps
         cards = np.isin(subject.materials, CARDS)
-        self._solid = np.ascontiguousarray(subject.faces[~cards])
-        self._cards = np.ascontiguousarray(subject.faces[cards])
-        self._solid_index = np.flatnonzero(~cards).astype(np.int32)
-        self._card_index = np.flatnonzero(cards).astype(np.int32)
+        self._solid = np.flatnonzero(~cards).astype(np.int32)
         self._paint = paint(subject)
+        self._tailored = tailored(subject)
+        self._sky = None if subject.skeleton is None else Sky(subject, *BODY_MAP, BODY_DIRECTIONS)
+        # From the neck up, occlusion comes from the finer maps of the head.
+        self._above = np.clip((subject.vertices[:, 1] - NECK) / NECK_BLEND, 0, 1)
         look = subject.look
         self._colors = Colors(
             skin=np.array(look.skin, np.float32),
@@ -85,10 +115,13 @@ class Studio:
             floor=-float(subject.head_in_world[1]),
             legs=_left_leg(subject),
             skirt=np.array(look.skirt, np.float32),
+            plain=clothes == "plain",
+            jumper=np.array(look.jumper, np.float32),
+            jeans=np.array(look.jeans, np.float32),
+            leather=np.array(look.leather, np.float32),
         )
-        self._eyes = np.array(
-            [[*eye.centre, *eye.axis, eye.iris_radius] for eye in subject.eyes], np.float32
-        )
+        if subject.strands is not None:
+            self._strand_colors = strand_colors(subject.strands, self._colors.hair)
 
     def figure(self, vertices: np.ndarray, world_from_head: np.ndarray) -> Figure:
         """Prepares a person for the pictures of one frame.
@@ -98,8 +131,12 @@ class Studio:
             world_from_head: (4, 4) pose of the head, which moves the whole mesh to the world.
         """
         covered = BUST if self.subject.skeleton is None else WHOLE
-        lights = lights_on(vertices, self._solid, world_from_head, self._lamps, covered)
-        return Figure(self._scene(vertices), lights, world_from_head)
+        lights = lights_on(
+            vertices, self.subject.faces, self._solid, world_from_head, self._lamps, covered
+        )
+        hair = self.subject.strands
+        strands = None if hair is None else hair.on(vertices)
+        return Figure(self._scene(vertices), lights, world_from_head, strands)
 
     def picture(self, camera: Camera, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
         """Draws one picture.
@@ -114,20 +151,24 @@ class Studio:
         size = (camera.height * SUPERSAMPLING, camera.width * SUPERSAMPLING)
         centre = local.camera_to_world[:3, 3].astype(np.float32)
         pixel = np.float32(np.linalg.norm(centre) / camera.intrinsics[0, 0])
-        nearest, triangle, barycentric = empty_buffers(*size)
-        rasterise(screen, self._solid, nearest, triangle, barycentric)
-        _renumber(triangle, self._solid_index)
-        out = np.zeros((*size, 4), np.float32)
-        shade(scene, self._colors, lights, screen, triangle, barycentric, centre, pixel, out)
-        front, triangle, barycentric = empty_buffers(*size)
-        rasterise(screen, self._cards, front, triangle, barycentric)
-        _renumber(triangle, self._card_index)
-        shade_cards(
-            scene, self._colors, lights, screen, front, triangle, barycentric, nearest, centre,
-            pixel, out,
-        )  # fmt: skip
-        averaged = _averaged(out, SUPERSAMPLING)  # (H, W, 4)
-        return averaged[..., :3], averaged[..., 3]
+        nearest, triangle = empty_buffers(*size)
+        rasterise(screen, scene.faces, self._solid, nearest, triangle)
+        out = np.zeros((camera.height, camera.width, 4), np.float32)
+        shade(scene, self._colors, lights, screen, nearest, triangle, centre, pixel, out)
+        hair = self.subject.strands
+        if hair is not None and figure.strands is not None:
+            overlay(
+                out,
+                nearest,
+                SUPERSAMPLING,
+                hair,
+                figure.strands,
+                self._strand_colors,
+                local,
+                lights,
+            )
+        finished = developed(out)  # (H, W, 4)
+        return finished[..., :3], finished[..., 3]
 
     def _scene(self, vertices: np.ndarray) -> Scene:
         subject = self.subject
@@ -135,15 +176,26 @@ class Studio:
         return Scene(
             subject.faces,
             subject.materials,
-            subject.corner_uv,
+            self._tailored.corner_uv if self._colors.plain else subject.corner_uv,
             subject.vertices,
             vertices,
             vertex_normals(vertices, subject.faces),
             self._paint.channels,
             self._paint.strands,
-            self._paint.occlusion_at(gap),
-            self._eyes,
+            self._occlusion(vertices, gap),
+            self._tailored.fields,
+            self._tailored.folds(vertices),
+            eye_rows(subject, vertices),
         )
+
+    def _occlusion(self, vertices: np.ndarray, gap: float) -> np.ndarray:
+        """(V,) float32 visible share of the sky: of a head by its lips, of a body by its pose."""
+        head = self._paint.occlusion_at(gap)
+        if self._sky is None:
+            return head
+        middle = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
+        body = self._sky.visible(vertices - middle)
+        return body + self._above * (np.minimum(head, 1.3 * body + 0.2) - body)
 
 
 def _left_leg(subject: Subject) -> np.ndarray:
@@ -152,19 +204,3 @@ def _left_leg(subject: Subject) -> np.ndarray:
     if bones is None:
         return np.zeros((2, 3), np.float32)
     return bones.at[[bones.index("upperleg01.L"), bones.index("foot.L")]].astype(np.float32)
-
-
-@njit(cache=True, nogil=True)
-def _renumber(triangle, index):
-    """Turns numbers within a subset of faces into numbers within all faces, in place."""
-    for y in range(triangle.shape[0]):
-        for x in range(triangle.shape[1]):
-            if triangle[y, x] >= 0:
-                triangle[y, x] = index[triangle[y, x]]
-
-
-def _averaged(samples: np.ndarray, factor: int) -> np.ndarray:
-    """(H, W, C) means of factor × factor blocks of (H·factor, W·factor, C)."""
-    height, width, channels = samples.shape
-    blocks = samples.reshape(height // factor, factor, width // factor, factor, channels)
-    return blocks.mean(axis=(1, 3))

@@ -1,15 +1,17 @@
 """Movements of a synthetic body: standing, gesturing, fast movements, swaying, walking in place."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ico3d.studio.acting.acting import Acting
+from ico3d.studio.acting.hands import DOWN, PLACES, RAISED, READY, Track, minimum_jerk
 from ico3d.studio.acting.limbs import Limb
 from ico3d.studio.acting.performance import wander
+from ico3d.studio.acting.repertoire import HANDS_DONE, looking_about, repertoire
 from ico3d.studio.person.skeleton import Skeleton
 
-MOTIONS = ("showcase", "talk", "walk", "sway")
+MOTIONS = ("showcase", "talk", "walk", "sway", "repertoire")
 ARM = 0.517
 """Length in metres, shoulder to wrist, of the arm for which lengths in this module are written.
 
@@ -48,87 +50,6 @@ STEPS = 1.7
 STEP_HEIGHT = 0.13
 
 
-@dataclass(frozen=True)
-class Hand:
-    """A pose of the left hand; the right hand mirrors it.
-
-    Attributes:
-        wrist: Wrist relative to the shoulder in metres: outwards, upwards, forwards.
-        elbow: Direction in which the elbow points, in the axes of `wrist`.
-        palm: Rotation of the forearm that turns the palm upwards, degrees.
-        flexed: Bend of the wrist towards the palm, degrees.
-        curled: Bend of each finger joint, degrees.
-    """
-
-    wrist: tuple[float, float, float]
-    elbow: tuple[float, float, float]
-    palm: float = 0.0
-    flexed: float = 0.0
-    curled: float = 14.0
-
-    def row(self) -> np.ndarray:
-        """The pose as (9,) numbers that can be interpolated."""
-        angles = np.radians([self.palm, self.flexed, self.curled])
-        return np.array([*self.wrist, *self.elbow, *angles])
-
-
-DOWN = Hand((0.058, -0.502, 0.03), (0.3, 0.0, -1.0), palm=-28.0, curled=20.0)
-CHEST = Hand((-0.07, -0.17, 0.25), (0.8, -0.7, -0.1), palm=-25.0, flexed=12.0, curled=16.0)
-PLACES = (
-    CHEST,
-    Hand((0.06, -0.22, 0.36), (0.5, -0.9, -0.3), palm=-35.0, curled=6.0),
-    Hand((0.14, -0.26, 0.33), (0.5, -0.8, -0.4), palm=-70.0, curled=4.0),
-    Hand((0.02, -0.12, 0.37), (0.6, -0.9, -0.2), palm=15.0, flexed=-10.0, curled=20.0),
-    Hand((0.10, -0.10, 0.34), (0.6, -0.8, -0.3), palm=-20.0, curled=28.0),
-)
-"""Poses of the hands during speech."""
-RAISED = (
-    Hand((0.05, 0.42, 0.13), (0.9, -0.1, 0.35), palm=10.0, curled=5.0),
-    Hand((0.12, 0.40, 0.16), (0.9, -0.1, 0.35), palm=-10.0, curled=8.0),
-)
-READY = Hand((0.06, -0.25, 0.31), (0.6, -0.8, -0.3), palm=-25.0, curled=12.0)
-"""Pose of a hand before and after it is raised above the head."""
-
-
-class Track:
-    """Movement of one hand: poses at key times, and minimum-jerk interpolation between them."""
-
-    def __init__(self):
-        """Starts with the hand hanging down at time 0."""
-        self.times, self.rows = [0.0], [DOWN.row()]
-
-    def hold(self, until: float) -> None:
-        """Keeps the pose until time `until` in seconds."""
-        self.times.append(max(until, self.times[-1]))
-        self.rows.append(self.rows[-1])
-
-    def go(self, hand: Hand, seconds: float, jitter: np.ndarray | None = None) -> None:
-        """Moves to a pose within `seconds`; `jitter` (3,) displaces the wrist, metres."""
-        row = hand.row()
-        if jitter is not None:
-            row[:3] += jitter
-        self.times.append(self.times[-1] + seconds)
-        self.rows.append(row)
-
-    @property
-    def now(self) -> float:
-        """Time of the last key in seconds."""
-        return self.times[-1]
-
-    def at(self, times: np.ndarray) -> np.ndarray:
-        """(F, 9) poses at times (F,) in seconds, as `Hand.row` writes them."""
-        return _minimum_jerk(np.array(self.times), np.stack(self.rows), times)
-
-
-def _minimum_jerk(keys: np.ndarray, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """(F, N) rows at (F,) seconds, from one of the rows (K, N) at (K,) seconds to the next."""
-    after = np.clip(np.searchsorted(keys, times, side="right"), 1, len(keys) - 1)
-    span = np.maximum(keys[after] - keys[after - 1], 1e-9)
-    part = np.clip((times - keys[after - 1]) / span, 0, 1)[:, None]
-    part = part**3 * (10 - 15 * part + 6 * part**2)
-    return rows[after - 1] + part * (rows[after] - rows[after - 1])
-
-
 def act(
     skeleton: Skeleton, motion: str, times: np.ndarray, seed: int, clear: bool = False
 ) -> Acting:
@@ -138,14 +59,21 @@ def act(
         skeleton: Skeleton of the person.
         motion: One of `MOTIONS`. `showcase`: stands calmly, gestures, moves fast, a third of the
             time each. `sway`: the same, but also turns the hips, first slowly, then fast. `talk`:
-            stands and gestures in turn. `walk`: walks in place.
+            stands and gestures in turn. `walk`: walks in place. `repertoire`: hands, head and chest
+            go through what they do in conversations, then the person walks in place.
         times: (F,) seconds, ascending from 0.
         seed: Seed of all random choices.
         clear: Whether hands keep away from hips and thighs.
     """
     random = np.random.default_rng([seed, 3])
     end = float(times[-1])
-    makers = {"showcase": _showcase, "sway": _showcase, "talk": _talk, "walk": _stand}
+    makers = {
+        "showcase": _showcase,
+        "sway": _showcase,
+        "talk": _talk,
+        "walk": _stand,
+        "repertoire": repertoire,
+    }
     tracks = makers[motion](end, random)
     hands = np.stack([track.at(times) for track in tracks])  # (2, F, 9)
     hands[:, :, :3] += 0.006 * np.stack(
@@ -154,8 +82,12 @@ def act(
     if clear:
         hands[:, :, :3] = _cleared(hands[:, :, :3])
     hands[:, :, :3] *= _size(skeleton)
-    stride = _stride(times, end if motion == "walk" else 0.0)
+    begin = {"walk": 0.0, "repertoire": HANDS_DONE * end}.get(motion, end)
+    stride = _stride(times, begin, end)
     acting = _whole_body(skeleton, times, hands, stride, random)
+    if motion == "repertoire":
+        head, chest = looking_about(times)
+        return replace(acting, head=acting.head + head, chest=acting.chest + chest)
     return _swaying(acting, times, end) if motion == "sway" else acting
 
 
@@ -176,7 +108,7 @@ def _swaying(acting: Acting, times: np.ndarray, end: float) -> Acting:
         ways = max(1, round(end / 3 / seconds))
         keys += [keys[-1] + end / 3 * (way + 1) / ways for way in range(ways)]
         turns += [angle * (-1) ** (len(turns) + way) for way in range(ways)]
-    turn = _minimum_jerk(np.array(keys), np.array(turns)[:, None], times)[:, 0]  # (F,)
+    turn = minimum_jerk(np.array(keys), np.array(turns)[:, None], times)[:, 0]  # (F,)
     zero = np.zeros_like(turn)
     yaw = np.stack([zero, turn, zero], 1)
     shift = np.stack([ASIDE * turn, np.full_like(turn, -BENT_KNEES), zero], 1)
@@ -259,10 +191,10 @@ def _stand(end: float, random: np.random.Generator) -> tuple[Track, Track]:
     return tracks
 
 
-def _stride(times: np.ndarray, until: float) -> np.ndarray:
-    """(2, F) how high each foot is, 0 to 1: steps begin after 0.3 s and end before `until`."""
-    cycles = 0.5 * STEPS * (times - 0.3)
-    last = np.floor(0.5 * STEPS * (until - 0.3) * 2) / 2
+def _stride(times: np.ndarray, begin: float, end: float) -> np.ndarray:
+    """(2, F) how high each foot is, 0 to 1: steps start 0.3 s after `begin`, end before `end`."""
+    cycles = 0.5 * STEPS * (times - begin - 0.3)
+    last = np.floor(0.5 * STEPS * (end - begin - 0.3) * 2) / 2
     feet = []
     for offset in (0.0, 0.5):
         phase = cycles - offset

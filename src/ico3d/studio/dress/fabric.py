@@ -9,8 +9,9 @@ ignored.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import CubicSpline
+
+from ico3d.splat.cpu.compile import kernel
 
 STEPS_PER_SECOND = 3600
 GRAVITY = 9.81
@@ -116,7 +117,7 @@ def _eased(start: np.ndarray, end: np.ndarray, steps: int) -> np.ndarray:
     return start + part * part * (3 - 2 * part) * (end - start)
 
 
-@njit(cache=True, nogil=True)
+@kernel(fast=False)
 def _follow(state, velocity, pins, ends, masses, pairs, lengths, compliance, radii, step):
     """Steps through S places of pins (S, P, 3) and limbs (S, C, 2, 3); changes the first two."""
     pinned = pins.shape[1]
@@ -145,7 +146,7 @@ def _follow(state, velocity, pins, ends, masses, pairs, lengths, compliance, rad
         before = ends[s]
 
 
-@njit(cache=True, nogil=True)
+@kernel(fast=False)
 def _hold(state, pairs, lengths, compliance, inverse, step):
     """Brings pairs of points back to their distance, one after the other."""
     for e in range(pairs.shape[0]):
@@ -169,7 +170,7 @@ def _hold(state, pairs, lengths, compliance, inverse, step):
         state[j, 2] -= b * z
 
 
-@njit(cache=True, nogil=True)
+@kernel(fast=False)
 def _calm(velocity, pairs, masses, part):
     """Brings the velocities of neighbours nearer to each other; their momentum stays."""
     for e in range(pairs.shape[0]):
@@ -181,7 +182,7 @@ def _calm(velocity, pairs, masses, part):
             velocity[j, axis] -= lost * masses[i]
 
 
-@njit(cache=True, nogil=True)
+@kernel(fast=False)
 def _push(state, old, pinned, was, now, radii):
     """Pushes points out of a limb, on which they slide with friction."""
     ax, ay, az = now[0]

@@ -31,6 +31,7 @@ LOOK = Look(
     cloth=((0.36, 0.125, 0.045), (0.50, 0.40, 0.25)),
     stripes=True,
     freckles=0.1,
+    jumper=(0.42, 0.235, 0.075),
     stubble=0.0,
 )
 
@@ -121,7 +122,8 @@ def _with_brow(subject: Subject, landmarks: list[int]) -> Subject:
     """Lays a card of brow hairs over five landmarks, from the nose outwards."""
     line = subject.landmarks(subject.vertices)[landmarks]  # (5, 3)
     along = np.linspace(0, 1, 17)
-    middle = np.stack([np.interp(along, np.linspace(0, 1, 5), c) for c in line.T], 1)  # (17, 3)
+    curve = np.polyfit(np.linspace(0, 1, 5), line, 2)  # (3, 3)
+    middle = np.stack([along**2, along, np.ones_like(along)], 1) @ curve  # (17, 3)
     middle[:, 1] += 0.002 * np.sin(np.pi * along) + 0.002
     width = BROW_WIDTH * (1 - 0.45 * along)
     across = np.linspace(-0.5, 0.5, 5)

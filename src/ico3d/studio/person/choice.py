@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ico3d.errors import SettingsError
 from ico3d.studio.person.anny_person import load_anny
+from ico3d.studio.person.growing.grow import with_hair
 from ico3d.studio.person.npz_person import load_npz
 from ico3d.studio.person.subject import Subject
 
@@ -24,5 +25,5 @@ def load_subject(subject: str, whole: bool = False) -> Subject:
     if subject == "anny" and whole:
         raise SettingsError("anny is a bust: name an .npz file to record a whole person.")
     if subject == "anny":
-        return load_anny()
-    return load_npz(Path(subject), whole)
+        return with_hair(load_anny())
+    return with_hair(load_npz(Path(subject), whole))

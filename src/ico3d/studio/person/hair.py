@@ -1,16 +1,8 @@
-"""Geometry of hair: edges of its sheets and directions of its strands."""
+"""Directions of strands on sheets of hair."""
 
 import numpy as np
 
-from ico3d.studio.person.subject import Material, Subject
-
-
-def hair_edge(subject: Subject) -> np.ndarray:
-    """Indices (N,) of vertices on open edges of the hair mesh, where sheets of hair end."""
-    hair = subject.faces[subject.materials == Material.HAIR]
-    corners = np.sort(hair[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(corners, axis=0, return_counts=True)
-    return np.unique(edges[count == 1])
+from ico3d.studio.person.subject import Subject
 
 
 def strand_frames(subject: Subject) -> np.ndarray:

@@ -3,11 +3,13 @@
 The layout is described in `docs/captures/synthetic.md`, "Subject files".
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.errors import CaptureError
+from ico3d.studio.person.edges import without_covered_neck
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.smooth import smoothed
 from ico3d.studio.person.subject import GARMENTS, Eye, Look, Material, Subject
@@ -53,14 +55,25 @@ RELAXED_ARMS = {
 }
 """Rotations that lower the arms of the rest pose: degrees about X, Y, Z, X applied first."""
 
+AWAKE = 0.4
+"""Part of the shape that widens the eyes that a face at rest has: the files' lids hang low."""
+LOOKS = {
+    "eyeLookUp": (-18.0, 0.0),
+    "eyeLookDown": (22.0, 0.0),
+    "eyeLookIn": (0.0, -26.0),
+    "eyeLookOut": (0.0, 26.0),
+}
+"""Rotations of the left eyeball in degrees about X and Y; the files' shapes move the lids only."""
+
 FAIR = Look(
-    skin=(0.60, 0.37, 0.27),
-    lips=(0.50, 0.17, 0.15),
-    hair=(0.080, 0.028, 0.013),
+    skin=(0.51, 0.305, 0.215),
+    lips=(0.40, 0.150, 0.130),
+    hair=(0.080, 0.031, 0.015),
     iris=(0.13, 0.21, 0.19),
     cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
     stripes=False,
     freckles=0.55,
+    jumper=(0.095, 0.165, 0.168),
     stubble=0.0,
 )
 TANNED = Look(
@@ -90,9 +103,9 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        subject = _subject(path.stem, arrays, whole)
+        subject = without_covered_neck(_subject(path.stem, arrays, whole))
         coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
-        return smoothed(subject, np.isin(subject.materials, coarse))
+        return smoothed(_with_turning_eyes(subject), np.isin(subject.materials, coarse))
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:
@@ -112,6 +125,7 @@ def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:
     parts = [str(p) for p in arrays["part_names"]]
     materials = np.array([known.get(p, 255) for p in parts], np.uint8)
     names, moved, deltas = _blendshapes(arrays, used)
+    _open_lids(vertices, names, moved, deltas)
     male = name.endswith("_m")
     return Subject(
         name=name,
@@ -140,6 +154,35 @@ def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:
         licence="MIT (keep ICT-FaceKit-LICENSE.txt) and CC0 1.0",
         skeleton=_skeleton(arrays, used, origin) if whole else None,
     )
+
+
+def _open_lids(
+    vertices: np.ndarray, names: tuple[str, ...], moved: np.ndarray, deltas: np.ndarray
+) -> None:
+    """Widens the eyes at rest, in place; lids that blink still close."""
+    for side in ("Left", "Right"):
+        if {f"eyeWide{side}", f"eyeBlink{side}"} <= set(names):
+            wider = AWAKE * deltas[names.index(f"eyeWide{side}")]
+            vertices[moved] += wider
+            deltas[names.index(f"eyeBlink{side}")] -= wider
+
+
+def _with_turning_eyes(subject: Subject) -> Subject:
+    """The person whose gaze shapes turn the eyeballs, too."""
+    ball = np.unique(subject.faces[subject.materials == Material.EYE])
+    moved = np.union1d(subject.delta_vertices, ball).astype(np.int32)
+    deltas = np.zeros((len(subject.deltas), len(moved), 3), np.float32)
+    deltas[:, np.searchsorted(moved, subject.delta_vertices)] = subject.deltas
+    for side, eye, sign in zip(("Left", "Right"), subject.eyes, (1, -1), strict=True):
+        own = ball[np.sign(subject.vertices[ball, 0]) == sign]
+        for name, (about_x, about_y) in LOOKS.items():
+            if name + side not in subject.blendshape_names:
+                continue
+            row = subject.blendshape_names.index(name + side)
+            turn = _rotation((about_x, sign * about_y, 0.0))
+            change = (subject.vertices[own] - eye.centre) @ (turn - np.eye(3)).T
+            deltas[row, np.searchsorted(moved, own)] = change
+    return replace(subject, delta_vertices=moved, deltas=deltas)
 
 
 def _kept_faces(

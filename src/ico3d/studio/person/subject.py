@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from ico3d.studio.person.skeleton import Skeleton
+from ico3d.studio.person.strands import Strands
 
 
 class Material(IntEnum):
@@ -64,6 +65,9 @@ class Look:
         trousers: (2, 3) albedo of the trousers and of their checks.
         shoe: (3,) albedo of the leather.
         skirt: (2, 3) albedo of a skirt and of its pattern.
+        jumper: (3,) albedo of the wool of a plain jumper.
+        jeans: (2, 3) albedo of jeans, dark and worn pale.
+        leather: (3,) albedo of plain shoes.
     """
 
     skin: tuple[float, float, float]
@@ -84,6 +88,12 @@ class Look:
         (0.045, 0.17, 0.13),
         (0.62, 0.46, 0.17),
     )
+    jumper: tuple[float, float, float] = (0.46, 0.40, 0.31)
+    jeans: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (0.022, 0.035, 0.075),
+        (0.20, 0.27, 0.38),
+    )
+    leather: tuple[float, float, float] = (0.115, 0.047, 0.020)
 
 
 @dataclass(frozen=True)
@@ -114,6 +124,7 @@ class Subject:
         licence: Licence of pictures that show this person.
         skeleton: Skeleton of a whole person, whose vertices are given in the skeleton's rest pose;
             None for a bust.
+        strands: Hair that is drawn strand by strand; None if only meshes stand for hair.
     """
 
     name: str
@@ -135,6 +146,7 @@ class Subject:
     sources: tuple[str, ...]
     licence: str
     skeleton: Skeleton | None = None
+    strands: Strands | None = None
 
     def posed(self, weights: np.ndarray) -> np.ndarray:
         """Vertices (V, 3) float32 for blendshape weights (K,), metres."""

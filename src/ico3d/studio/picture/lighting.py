@@ -1,80 +1,23 @@
-"""The lights of the studio, and how surfaces reflect them, in linear light."""
+"""What the lights of a studio give to a spot of a surface, in linear light.
+
+A material calls `lit` with its `Spot`, or puts its own answer together: `seen_lamp` is the share of
+a lamp that reaches the spot, `ambient` the light of the surroundings on a diffuse surface,
+`mirrored` what a mirror would show, `diffuse` and `highlight` how a surface reflects one lamp.
+"""
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from ico3d.studio.picture.paint import light_basis, light_screen
-from ico3d.studio.raster import empty_buffers, rasterise
+from ico3d.splat.cpu.compile import kernel, subroutine
+from ico3d.studio.picture.lamps import Lamps
+from ico3d.studio.picture.shadows import Covered, Shadow, cast, seen
 
-SHADOW_BIAS = 0.004
-"""Depth in metres behind the shadow map that still counts as lit.
-
-A larger value gives fewer speckles but lets more light leak into shadows.
-"""
-
-
-@dataclass(frozen=True)
-class Lamps:
-    """The lights of a studio: distant lamps and surrounding light, in linear RGB.
-
-    Attributes:
-        directions: (3, 3) rows: unit vectors towards key, fill and rim light, in the world.
-        colors: (3, 3) rows: colours of key, fill and rim light.
-        sky: (3,) light from above.
-        ground: (3,) light from below.
-        cloth: (3,) light that the grey cloth behind the person reflects.
-    """
-
-    directions: np.ndarray
-    colors: np.ndarray
-    sky: np.ndarray
-    ground: np.ndarray
-    cloth: np.ndarray
-
-
-STUDIOS = {
-    "studio": Lamps(
-        np.array([[-0.55, 0.55, 0.80], [0.85, 0.15, 0.60], [0.75, 0.55, -0.75]]),
-        np.array([[1.25, 1.17, 1.06], [0.26, 0.28, 0.33], [0.60, 0.62, 0.66]]),
-        np.array([0.34, 0.36, 0.395]),
-        np.array([0.17, 0.155, 0.14]),
-        np.array([0.92, 0.97, 1.06]),
-    ),
-    "warm": Lamps(
-        np.array([[0.75, 0.45, 0.65], [-0.80, 0.25, 0.55], [-0.60, 0.65, -0.80]]),
-        np.array([[1.42, 1.02, 0.62], [0.30, 0.24, 0.19], [0.72, 0.52, 0.34]]),
-        np.array([0.40, 0.335, 0.26]),
-        np.array([0.20, 0.145, 0.095]),
-        np.array([1.15, 0.93, 0.70]),
-    ),
-}
-"""`studio`: neutral, key light from the person's right; `warm`: like bulbs, from the left."""
-
-
-@dataclass(frozen=True)
-class ShadowMap:
-    """The region that a depth map of the key light covers.
-
-    Attributes:
-        size: Side of the map in texels.
-        reach: Half of the side in metres.
-        centre: (3,) centre of the region, in the world if `whole`, else in canonical head space,
-            metres.
-        whole: Whether the region holds the whole person.
-    """
-
-    size: int
-    reach: float
-    centre: np.ndarray
-    whole: bool
-
-
-BUST = ShadowMap(448, 0.36, np.zeros(3), False)
-WHOLE = ShadowMap(1024, 1.25, np.array([0.0, 1.05, 0.0]), True)
+KEY, FILL, RIM = 0, 1, 2
+"""Rows of the lamps."""
+OFF = 0.003
+"""Metres off the surface at which shadows are looked up: grazing light shades no own triangle."""
 
 
 class Lights(NamedTuple):
@@ -83,97 +26,224 @@ class Lights(NamedTuple):
     Attributes:
         directions: (3, 3) float32 rows: unit vectors towards key, fill and rim light.
         colors: (3, 3) float32 linear RGB.
-        up: (3,) float32, upward direction of the world.
-        sky: (3,) float32 light from above.
-        ground: (3,) float32 light from below.
-        shadow: (S, S) float32 depth map of the key light.
-        basis: (3, 3) float32 axes of the depth map (see `light_basis`).
-        centre: (3,) float32 centre of the depth map, metres.
-        scale: Texels of the depth map per metre.
+        sizes: (3,) float32 tangents of half the angles under which the lamps are seen.
+        turn: (3, 3) float32 rotation from canonical space to the world.
+        harmonics: (9, 3) float32 `Lamps.harmonics`.
+        key: Depth map of the key light.
+        rim: Depth map of the rim light.
     """
 
     directions: np.ndarray
     colors: np.ndarray
-    up: np.ndarray
-    sky: np.ndarray
-    ground: np.ndarray
-    shadow: np.ndarray
-    basis: np.ndarray
-    centre: np.ndarray
-    scale: float
+    sizes: np.ndarray
+    turn: np.ndarray
+    harmonics: np.ndarray
+    key: Shadow
+    rim: Shadow
 
 
 def lights_on(
     vertices: np.ndarray,
+    faces: np.ndarray,
     solid: np.ndarray,
     world_from_head: np.ndarray,
     lamps: Lamps,
-    covered: ShadowMap,
+    covered: Covered,
 ) -> Lights:
     """The studio's lights for one frame.
 
     Args:
         vertices: (V, 3) float32 posed, canonical head space.
-        solid: (F, 3) int32 faces that cast shadows.
+        faces: (F, 3) int32.
+        solid: (N,) int32 the faces that cast shadows.
         world_from_head: (4, 4) pose of the head.
         lamps: How the studio is lit.
         covered: The region in which shadows are computed.
     """
-    unit = lamps.directions / np.linalg.norm(lamps.directions, axis=1, keepdims=True)
     rotation = world_from_head[:3, :3]
-    directions = unit @ rotation  # rows: Rᵀ·direction
+    towards = lamps.towards @ rotation  # rows: Rᵀ·direction
     centre = covered.centre
     if covered.whole:
         centre = (centre - world_from_head[:3, 3]) @ rotation
-    screen = light_screen(vertices - centre, directions[0], covered.size, covered.reach)
-    shadow, triangle, barycentric = empty_buffers(covered.size, covered.size)
-    rasterise(screen, solid, shadow, triangle, barycentric)
+    key, rim = (
+        cast(vertices, faces, solid, towards[i], float(lamps.sizes[i]), covered, centre)
+        for i in (KEY, RIM)
+    )
     return Lights(
-        directions=directions.astype(np.float32),
+        directions=towards.astype(np.float32),
         colors=lamps.colors.astype(np.float32),
-        up=rotation[1].astype(np.float32),
-        sky=lamps.sky.astype(np.float32),
-        ground=lamps.ground.astype(np.float32),
-        shadow=shadow,
-        basis=light_basis(directions[0]).astype(np.float32),
-        centre=centre.astype(np.float32),
-        scale=covered.size / (2.0 * covered.reach),
+        sizes=lamps.sizes.astype(np.float32),
+        turn=rotation.astype(np.float32),
+        harmonics=lamps.harmonics().astype(np.float32),
+        key=key,
+        rim=rim,
     )
 
 
-@njit(cache=True, nogil=True)
-def key_visibility(lights, x, y, z):
-    """Share of the key light that reaches a point, 0 to 1: a soft 4×4 look-up in the depth map."""
-    basis, shadow = lights.basis, lights.shadow
-    size = shadow.shape[0]
-    scale = lights.scale
-    x, y, z = x - lights.centre[0], y - lights.centre[1], z - lights.centre[2]
-    u = (basis[0, 0] * x + basis[0, 1] * y + basis[0, 2] * z) * scale + 0.5 * size - 0.5
-    v = (basis[1, 0] * x + basis[1, 1] * y + basis[1, 2] * z) * scale + 0.5 * size - 0.5
-    depth = basis[2, 0] * x + basis[2, 1] * y + basis[2, 2] * z + 2.0 + SHADOW_BIAS
-    i, j = math.floor(u), math.floor(v)
-    if i < 2 or j < 2 or i >= size - 3 or j >= size - 3:
-        return 1.0
-    lit = 0.0
-    for dj in range(-1, 3):
-        weight_j = 1.0 - abs(v - j - dj) / 2.0
-        for di in range(-1, 3):
-            if shadow[j + dj, i + di] <= depth:
-                lit += weight_j * (1.0 - abs(u - i - di) / 2.0)
-    return min(1.0, lit / 4.0)
+@subroutine()
+def seen_lamp(lights, lamp, p, n, occlusion):
+    """Share of a lamp that reaches a point with a normal, 0 to 1.
+
+    Args:
+        lights: Lights of the frame.
+        lamp: `KEY`, `FILL` or `RIM`.
+        p: Position (3), metres.
+        n: Unit normal (3) of the mesh, without relief.
+        occlusion: Visible share of the sky; stands in for the shadow of the wide fill light, and
+            darkens creases that are too fine for a depth map.
+    """
+    if lamp == FILL:
+        return min(1.0, 1.5 * occlusion)
+    x, y, z = p[0] + OFF * n[0], p[1] + OFF * n[1], p[2] + OFF * n[2]
+    crease = min(1.0, 0.35 + 1.3 * occlusion)
+    if lamp == KEY:
+        return crease * seen(lights.key, x, y, z, n[0], n[1], n[2])
+    return crease * seen(lights.rim, x, y, z, n[0], n[1], n[2])
 
 
-@njit(cache=True, nogil=True)
-def wrapped(cosine, wrap):
-    """Diffuse light that reaches past the terminator, as in skin; total energy is kept."""
-    value = max(0.0, (cosine + wrap) / (1.0 + wrap))
-    return value / (1.0 + wrap)
+@kernel()
+def ambient(lights, n):
+    """Light (3) of the surroundings on a diffuse surface with unit normal n that sees them all."""
+    turn, h = lights.turn, lights.harmonics
+    x = turn[0, 0] * n[0] + turn[0, 1] * n[1] + turn[0, 2] * n[2]
+    y = turn[1, 0] * n[0] + turn[1, 1] * n[1] + turn[1, 2] * n[2]
+    z = turn[2, 0] * n[0] + turn[2, 1] * n[1] + turn[2, 2] * n[2]
+    b1, b2, b3 = 0.488603 * y, 0.488603 * z, 0.488603 * x
+    b4, b5, b6 = 1.092548 * x * y, 1.092548 * y * z, 0.315392 * (3.0 * z * z - 1.0)
+    b7, b8 = 1.092548 * x * z, 0.546274 * (x * x - y * y)
+    return (
+        _series(h, 0, b1, b2, b3, b4, b5, b6, b7, b8),
+        _series(h, 1, b1, b2, b3, b4, b5, b6, b7, b8),
+        _series(h, 2, b1, b2, b3, b4, b5, b6, b7, b8),
+    )
 
 
-@njit(cache=True, nogil=True)
-def gloss(n_dot_h, n_dot_l, v_dot_h, power, facing):
-    """Normalised Blinn-Phong highlight with Fresnel effect; `facing` is the frontal reflectance."""
+@subroutine()
+def _series(h, c, b1, b2, b3, b4, b5, b6, b7, b8):
+    first = 0.282095 * h[0, c] + b1 * h[1, c] + b2 * h[2, c] + b3 * h[3, c] + b4 * h[4, c]
+    return max(0.0, first + b5 * h[5, c] + b6 * h[6, c] + b7 * h[7, c] + b8 * h[8, c])
+
+
+@subroutine()
+def mirrored(lights, direction, blur):
+    """Light (3) that a mirror sees in a unit direction: the lamps as soft discs in the room.
+
+    Args:
+        lights: Lights of the frame.
+        direction: (3) unit vector.
+        blur: Tangent by which the lamps' edges are blurred.
+    """
+    r, g, b = ambient(lights, direction)
+    for i in range(3):
+        to = lights.directions[i]
+        cosine = direction[0] * to[0] + direction[1] * to[1] + direction[2] * to[2]
+        if cosine <= 0.0:
+            continue
+        off = math.sqrt(max(0.0, 1.0 - cosine * cosine)) / cosine
+        size = lights.sizes[i]
+        edge = min(1.0, max(0.0, (size + blur - off) / (2.0 * blur + 1e-3)))
+        # A lamp of this size that gives unit light has this radiance, over π.
+        glow = edge / ((size + 0.5 * blur) ** 2 + 1e-4)
+        r, g, b = (
+            r + glow * lights.colors[i, 0],
+            g + glow * lights.colors[i, 1],
+            b + glow * lights.colors[i, 2],
+        )
+    return r, g, b
+
+
+@subroutine()
+def unoccluded(occlusion, albedo):
+    """Ambient light that arrives where a share of the sky is hidden by a surface of this albedo.
+
+    Light that is reflected between surfaces brightens creases in their own colour (Jiménez et al.,
+    "Practical real-time strategies for accurate indirect occlusion").
+    """
+    a = 2.0404 * albedo - 0.3324
+    b = -4.7951 * albedo + 0.6417
+    c = 2.7552 * albedo + 0.6903
+    return max(occlusion, ((occlusion * a + b) * occlusion + c) * occlusion)
+
+
+@subroutine()
+def diffuse(cosine, scatter):
+    """Diffuse light that reaches past the terminator by `scatter`, as in skin; energy is kept."""
+    value = max(0.0, (cosine + scatter) / (1.0 + scatter))
+    return value / (1.0 + scatter)
+
+
+@subroutine()
+def highlight(n_dot_h, n_dot_l, l_dot_h, roughness, facing, size):
+    """Highlight of a lamp: GGX, widened by the lamp's size; `facing` is the frontal reflectance."""
     if n_dot_l <= 0.0 or n_dot_h <= 0.0:
         return 0.0
-    fresnel = facing + (1.0 - facing) * (1.0 - max(0.0, v_dot_h)) ** 5
-    return fresnel * (power + 8.0) / 25.13 * n_dot_h**power * n_dot_l
+    sharp = roughness * roughness
+    alpha = min(1.0, sharp + 0.5 * size)
+    d = n_dot_h * n_dot_h * (alpha * alpha - 1.0) + 1.0001
+    fresnel = facing + (1.0 - facing) * (1.0 - max(0.0, l_dot_h)) ** 5
+    spread = alpha * alpha / (4.0 * d * d * max(0.1, l_dot_h * l_dot_h) * (roughness + 0.5))
+    return fresnel * spread * n_dot_l
+
+
+@subroutine()
+def lit(spot, lights, n, v, p, smooth, occlusion):
+    """Linear light (3) that a spot sends to the eye.
+
+    Args:
+        spot: What the surface is made of, a `Spot`.
+        lights: Lights of the frame.
+        n: Unit normal (3), with relief.
+        v: Unit vector (3) towards the eye.
+        p: Position (3), metres.
+        smooth: Unit normal (3) of the mesh, without relief.
+        occlusion: Visible share of the sky.
+    """
+    nx, ny, nz = n
+    red, green, blue = ambient(lights, n)
+    facing_eye = max(0.0, nx * v[0] + ny * v[1] + nz * v[2])
+    rim = (1.0 - facing_eye) ** 4
+    fuzz_red, fuzz_green, fuzz_blue = (
+        spot.sheen * rim * (0.3 + spot.red),
+        spot.sheen * rim * (0.3 + spot.green),
+        spot.sheen * rim * (0.3 + spot.blue),
+    )
+    r = red * (spot.red * unoccluded(occlusion, spot.red) + fuzz_red * occlusion)
+    g = green * (spot.green * unoccluded(occlusion, spot.green) + fuzz_green * occlusion)
+    b = blue * (spot.blue * unoccluded(occlusion, spot.blue) + fuzz_blue * occlusion)
+    if spot.facing > 0.0:
+        # What a rough mirror shows of the room, at the strength of its frontal reflectance.
+        c = 2.0 * facing_eye
+        mr, mg, mb = ambient(lights, (c * nx - v[0], c * ny - v[1], c * nz - v[2]))
+        gloss = occlusion * (spot.facing + (1.0 - spot.roughness) * 0.3 * rim)
+        r, g, b = r + gloss * mr, g + gloss * mg, b + gloss * mb
+    for i in range(3):
+        to = lights.directions[i]
+        cosine = nx * to[0] + ny * to[1] + nz * to[2]
+        if cosine <= -spot.scatter:
+            continue
+        # Relief does not catch light that comes from behind the surface.
+        level = smooth[0] * to[0] + smooth[1] * to[1] + smooth[2] * to[2]
+        risen = min(1.0, max(0.0, (level + spot.scatter) / 0.35))
+        if risen <= 0.0:
+            continue
+        reach = risen * seen_lamp(lights, i, p, smooth, occlusion)
+        if reach <= 0.0:
+            continue
+        shine = 0.0
+        hx, hy, hz = to[0] + v[0], to[1] + v[1], to[2] + v[2]
+        s = 1.0 / max(1e-6, math.sqrt(hx * hx + hy * hy + hz * hz))
+        if spot.facing > 0.0:
+            shine = highlight(
+                s * (nx * hx + ny * hy + nz * hz),
+                cosine,
+                s * (to[0] * hx + to[1] * hy + to[2] * hz),
+                spot.roughness,
+                spot.facing,
+                lights.sizes[i],
+            )
+        glow = diffuse(cosine, 0.4)
+        far, near = diffuse(cosine, spot.scatter), diffuse(cosine, 0.6 * spot.scatter)
+        r += reach * lights.colors[i, 0] * (spot.red * far + shine + fuzz_red * glow)
+        g += reach * lights.colors[i, 1] * (spot.green * near + shine + fuzz_green * glow)
+        b += reach * lights.colors[i, 2] * (spot.blue * near + shine + fuzz_blue * glow)
+    return r, g, b

@@ -4,24 +4,31 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.studio.person.subject import Material
-from ico3d.studio.picture import garments
 from ico3d.studio.picture import materials as paints
-from ico3d.studio.picture.lighting import gloss, key_visibility, wrapped
-from ico3d.studio.picture.materials import Spot
-from ico3d.studio.picture.textures import noise, smoothstep, strands
+from ico3d.studio.picture.clothes import garments, knitwear
+from ico3d.studio.picture.clothes.clothed import clothed
+from ico3d.studio.picture.eyeball import shaded_eye
+from ico3d.studio.picture.lighting import lit, seen_lamp
+from ico3d.studio.picture.skin import lit_skin, relieved, skin_at
+from ico3d.studio.picture.textures import noise, strands
+from ico3d.studio.raster import weights_at
 
 SKIN, MOUTH, EYE = int(Material.SKIN), int(Material.MOUTH), int(Material.EYE)
 TEETH, GUMS, TONGUE = int(Material.TEETH), int(Material.GUMS), int(Material.TONGUE)
-HAIR, CLOTH, BROW = int(Material.HAIR), int(Material.CLOTH), int(Material.BROW)
+HAIR, CLOTH = int(Material.HAIR), int(Material.CLOTH)
 TROUSERS, SHOE, SOCK = int(Material.TROUSERS), int(Material.SHOE), int(Material.SOCK)
 SKIRT = int(Material.SKIRT)
 
 
 MOUTH_DEPTH = 0.026
 """Distance in metres behind the lips over which light in the mouth falls to 1/e."""
+TOGETHER = 0.01
+"""Relative difference of nearness up to which samples of a pixel show one surface."""
+BRIGHTEST = 4.0
+"""Linear light of the brightest sample: a pixel's edge stays smooth where a highlight ends."""
 
 
 class Scene(NamedTuple):
@@ -37,7 +44,9 @@ class Scene(NamedTuple):
         channels: (V, 6) float32 `Paint.channels`.
         strands: (V, 4) float32 `Paint.strands`.
         occlusion: (V,) float32 `Paint.occlusion_at` of this frame.
-        eyes: (2, 7) float32 left and right eye: centre (3), axis (3), iris radius, metres.
+        fields: (V, 8) float32 `Tailored.fields`.
+        folds: (V,) float32 `Tailored.folds` of this frame.
+        eyes: (2, 25) float32 `eye_rows` of this frame.
     """
 
     faces: np.ndarray
@@ -49,20 +58,12 @@ class Scene(NamedTuple):
     channels: np.ndarray
     strands: np.ndarray
     occlusion: np.ndarray
+    fields: np.ndarray
+    folds: np.ndarray
     eyes: np.ndarray
 
 
-@njit(cache=True, nogil=True)
-def _weights(screen, faces, f, v, w):
-    """Perspective-correct weights of the corners from screen-space ones."""
-    a = (1.0 - v - w) * screen[faces[f, 0], 2]
-    b = v * screen[faces[f, 1], 2]
-    c = w * screen[faces[f, 2], 2]
-    total = 1.0 / (a + b + c)
-    return a * total, b * total, c * total
-
-
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _mix3(values, faces, f, a, b, c):
     """Interpolates a (V, 3) attribute."""
     i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -73,13 +74,13 @@ def _mix3(values, faces, f, a, b, c):
     )
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _unit(x, y, z):
     length = 1.0 / max(1e-12, math.sqrt(x * x + y * y + z * z))
     return x * length, y * length, z * length
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _uv(corner_uv, f, a, b, c):
     uv = corner_uv[f]
     return (
@@ -88,7 +89,7 @@ def _uv(corner_uv, f, a, b, c):
     )
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _strand(scene, f, a, b, c):
     """Unit vector along the strands, and units of u per metre."""
     i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
@@ -101,7 +102,7 @@ def _strand(scene, f, a, b, c):
     return x, y, z, a * s[i, 3] + b * s[j, 3] + c * s[k, 3]
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _painted(scene, f, a, b, c):
     """The six channels of `Paint` at a spot."""
     i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
@@ -116,61 +117,12 @@ def _painted(scene, f, a, b, c):
     )
 
 
-@njit(cache=True, nogil=True)
-def display(value):
-    """Converts linear light to a display value in [0, 1]: a soft shoulder, then the sRGB curve."""
-    if value > 0.6:
-        value = 0.6 + 0.4 * (1.0 - math.exp(-(value - 0.6) / 0.4))
-    if value <= 0.0031308:
-        return 12.92 * max(0.0, value)
-    return 1.055 * value ** (1.0 / 2.4) - 0.055
-
-
-@njit(cache=True, nogil=True)
-def _lit(spot, lights, n, v, p, occlusion):
-    """Linear light (3) that a spot sends to the eye."""
-    nx, ny, nz = n
-    o = 0.003  # metres off the surface: grazing light does not shade its own triangle
-    up = 0.5 + 0.5 * (nx * lights.up[0] + ny * lights.up[1] + nz * lights.up[2])
-    bounce = 0.10 * (1.0 - occlusion) * (0.3 + occlusion)  # folds glow in their own colour
-    ambient_r = occlusion * (lights.ground[0] * (1 - up) + lights.sky[0] * up) + 1.3 * bounce
-    ambient_g = occlusion * (lights.ground[1] * (1 - up) + lights.sky[1] * up) + 0.6 * bounce
-    ambient_b = occlusion * (lights.ground[2] * (1 - up) + lights.sky[2] * up) + 0.5 * bounce
-    r, g, b = spot.red * ambient_r, spot.green * ambient_g, spot.blue * ambient_b
-    for i in range(3):
-        lx, ly, lz = lights.directions[i]
-        cosine = nx * lx + ny * ly + nz * lz
-        reach = min(1.0, 1.6 * occlusion)
-        if i == 0:
-            reach = key_visibility(lights, p[0] + o * nx, p[1] + o * ny, p[2] + o * nz) * min(
-                1.0, 0.35 + 1.3 * occlusion
-            )
-        hx, hy, hz = _unit(lx + v[0], ly + v[1], lz + v[2])
-        shine = 0.0
-        if spot.facing > 0.0:
-            shine = gloss(
-                nx * hx + ny * hy + nz * hz,
-                cosine,
-                v[0] * hx + v[1] * hy + v[2] * hz,
-                spot.power,
-                spot.facing,
-            )
-        red = wrapped(cosine, spot.wrap)
-        other = wrapped(cosine, 0.6 * spot.wrap)
-        r += reach * lights.colors[i, 0] * (spot.red * red + shine)
-        g += reach * lights.colors[i, 1] * (spot.green * other + shine)
-        b += reach * lights.colors[i, 2] * (spot.blue * other + shine)
-    return r, g, b
-
-
-@njit(cache=True, nogil=True)
-def _strand_shine(lights, tangent, v, p, shift, occlusion):
+@subroutine(fast=False)
+def _strand_shine(lights, tangent, v, p, n, shift, occlusion):
     """Two highlights of light on strands (Kajiya-Kay), white one and tinted one."""
     white, tinted = 0.0, 0.0
     for i in range(3):
-        reach = min(1.0, 0.3 + occlusion)
-        if i == 0:
-            reach *= key_visibility(lights, p[0], p[1], p[2])
+        reach = seen_lamp(lights, i, p, n, occlusion)
         lx, ly, lz = lights.directions[i]
         hx, hy, hz = _unit(lx + v[0], ly + v[1], lz + v[2])
         along = tangent[0] * hx + tangent[1] * hy + tangent[2] * hz
@@ -181,22 +133,7 @@ def _strand_shine(lights, tangent, v, p, shift, occlusion):
     return white, tinted
 
 
-@njit(cache=True, nogil=True)
-def _eye_at(scene, rest):
-    """Index of the eye, distance from its axis, angle about it, and the cornea's normal."""
-    side = 0 if rest[0] > 0.0 else 1
-    e = scene.eyes[side]
-    dx, dy, dz = rest[0] - e[0], rest[1] - e[1], rest[2] - e[2]
-    along = dx * e[3] + dy * e[4] + dz * e[5]
-    px, py, pz = dx - along * e[3], dy - along * e[4], dz - along * e[5]
-    radius = math.sqrt(px * px + py * py + pz * pz)
-    bulge = 1.0 - smoothstep(0.9 * e[6], 1.25 * e[6], radius)
-    forward = 0.45 * bulge * math.sqrt(dx * dx + dy * dy + dz * dz)
-    n = _unit(dx - forward * e[3], dy - forward * e[4], dz - forward * e[5])
-    return radius, math.atan2(py, px), e[6], n
-
-
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _spot(scene, colors, f, a, b, c, rest, pixel):
     """What the surface is made of at one spot."""
     material = scene.materials[f]
@@ -204,6 +141,8 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
     if material == TROUSERS:
         return garments.trousers(colors, x, y, z, pixel)
     if material == SHOE:
+        if colors.plain:
+            return knitwear.leather(colors, x, y, z, pixel)
         return garments.shoe(colors, x, y, z, pixel)
     if material == SOCK:
         return garments.sock(x, y, z, pixel)
@@ -221,13 +160,10 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
         return paints.flesh(0.42, 0.15, 0.14, x, y, z, pixel)
     if material == TONGUE:
         return paints.flesh(0.46, 0.18, 0.16, x, y, z, pixel)
-    if material == MOUTH:
-        return paints.flesh(0.34, 0.11, 0.10, x, y, z, pixel)
-    values = _painted(scene, f, a, b, c)
-    return paints.skin(colors, values, x, y, z, pixel)
+    return paints.flesh(0.34, 0.11, 0.10, x, y, z, pixel)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
     """Linear light (3) from one spot of a solid face."""
     rest = _mix3(scene.rest, scene.faces, f, a, b, c)
@@ -237,25 +173,36 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
     v = _unit(camera[0] - p[0], camera[1] - p[1], camera[2] - p[2])
     if n[0] * v[0] + n[1] * v[1] + n[2] * v[2] < -0.2:
         n = (-n[0], -n[1], -n[2])
+    smooth = n
     i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
     occlusion = a * scene.occlusion[i] + b * scene.occlusion[j] + c * scene.occlusion[k]
     material = scene.materials[f]
     if material == EYE:
-        radius, angle, iris, n = _eye_at(scene, rest)
-        spot = paints.eye(colors, radius, angle, iris, rest[0], rest[1], rest[2], pixel)
-        return _lit(spot, lights, n, v, p, occlusion)
+        eye = scene.eyes[0 if rest[0] > 0.0 else 1]
+        return shaded_eye(colors, eye, p, v, smooth, lights, occlusion, pixel)
+    if material == SKIN:
+        values = _painted(scene, f, a, b, c)
+        wide = pixel / max(0.3, n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
+        n, hollow = relieved(n, values[0], rest[0], rest[1], rest[2], wide)
+        skin = skin_at(colors, values, rest[0], rest[1], rest[2], wide)
+        return lit_skin(skin, lights, n, v, p, smooth, occlusion * hollow)
     if material == HAIR:
         tx, ty, tz, per_metre = _strand(scene, f, a, b, c)
         uv = _uv(scene.corner_uv, f, a, b, c)
         spot = paints.hair(colors, uv[0], uv[1], rest[0], rest[1], rest[2], pixel * per_metre)
         shift = 0.10 * strands(uv[0], uv[1], 260.0, pixel * per_metre)
-        white, tinted = _strand_shine(lights, (tx, ty, tz), v, p, shift, occlusion)
-        r, g, bl = _lit(spot, lights, n, v, p, occlusion)
+        white, tinted = _strand_shine(lights, (tx, ty, tz), v, p, n, shift, occlusion)
+        r, g, bl = lit(spot, lights, n, v, p, n, occlusion)
         return (
             r + 0.022 * white + 0.9 * tinted * colors.hair[0],
             g + 0.020 * white + 0.9 * tinted * colors.hair[1],
             bl + 0.018 * white + 0.9 * tinted * colors.hair[2],
         )
+    if colors.plain and material in (CLOTH, TROUSERS):
+        # A pixel sees more of a surface that turns away: fine relief fades there.
+        wide = pixel / max(0.3, n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
+        spot, n, valley = clothed(scene, colors, f, a, b, c, rest, n, wide)
+        return lit(spot, lights, n, v, p, smooth, occlusion * valley)
     spot = _spot(scene, colors, f, a, b, c, rest, pixel)
     tilt = spot.bump * min(1.0, max(0.0, 0.0016 / pixel - 1.0))
     if tilt > 0.0:
@@ -266,97 +213,98 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
             n[1] + tilt * (2.0 * noise(q[0] + 31.0, q[1], q[2]) - 1.0),
             n[2] + tilt * (2.0 * noise(q[0], q[1] + 57.0, q[2]) - 1.0),
         )
-    if material in (SKIN, CLOTH, TROUSERS, SHOE, SOCK, SKIRT):
-        return _lit(spot, lights, n, v, p, occlusion)
+    if material in (CLOTH, TROUSERS, SHOE, SOCK, SKIRT):
+        return lit(spot, lights, n, v, p, smooth, occlusion)
     inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
-    r, g, bl = _lit(spot, lights, n, v, p, (0.35 + 0.65 * occlusion) * inward)
+    r, g, bl = lit(spot, lights, n, v, p, smooth, (0.35 + 0.65 * occlusion) * inward)
     # Deep in the mouth, light has been red-tinted by lips and cheeks.
     return r * (0.25 + 0.75 * inward), g * inward**1.4, bl * inward**1.6
 
 
-@njit(cache=True, nogil=True)
-def shade(scene, colors, lights, screen, triangle, barycentric, camera, pixel, out):
-    """Colours the samples of solid faces.
+@kernel(fast=False)
+def shade(scene, colors, lights, screen, nearest, triangle, camera, pixel, out):
+    """Colours pixels by the light of the faces that their samples see.
+
+    Samples of a pixel that see one material at one depth are coloured once, in their midst; small
+    bright things such as eyes sample by sample.
 
     Args:
         scene: The posed person.
         colors: Colours of the person.
         lights: Lights of the frame.
         screen: (V, 3) float32 from `to_screen`.
-        triangle: (H, W) int32 from `rasterise`.
-        barycentric: (H, W, 2) float32 from `rasterise`.
+        nearest: (H·S, W·S) float32 from `rasterise`, with S × S samples per pixel.
+        triangle: (H·S, W·S) int32 from `rasterise`.
         camera: (3,) the camera's centre in canonical head space.
         pixel: Size of a pixel at the head, metres.
-        out: (H, W, 4) float32 display RGB and alpha, premultiplied; changed where covered.
+        out: (H, W, 4) float32 linear light and alpha, premultiplied; changed where covered.
     """
-    height, width = triangle.shape
+    height, width = out.shape[:2]
+    across = triangle.shape[0] // height
+    count = across * across
+    left = np.zeros(count, np.bool_)
     for y in range(height):
         for x in range(width):
-            f = triangle[y, x]
-            if f < 0:
-                continue
-            v, w = barycentric[y, x, 0], barycentric[y, x, 1]
-            a, b, c = _weights(screen, scene.faces, f, v, w)
-            r, g, bl = _shade_one(scene, colors, lights, f, a, b, c, camera, pixel)
-            out[y, x, 0], out[y, x, 1] = display(r), display(g)
-            out[y, x, 2], out[y, x, 3] = display(bl), 1.0
+            remaining = 0
+            for s in range(count):
+                left[s] = triangle[y * across + s // across, x * across + s % across] >= 0
+                remaining += left[s]
+            share = 1.0 / count
+            while remaining > 0:
+                s, members = _midst(scene.materials, nearest, triangle, x, y, across, left)
+                remaining -= members
+                column, row = x * across + s % across, y * across + s // across
+                f = triangle[row, column]
+                a, b, c = weights_at(screen, scene.faces, f, column + 0.5, row + 0.5)
+                r, g, bl = _shade_one(scene, colors, lights, f, a, b, c, camera, pixel)
+                part = members * share
+                out[y, x, 0] += part * min(r, BRIGHTEST)
+                out[y, x, 1] += part * min(g, BRIGHTEST)
+                out[y, x, 2] += part * min(bl, BRIGHTEST)
+                out[y, x, 3] += part
 
 
-@njit(cache=True, nogil=True)
-def _card_alpha(material, u, v, pixel_u):
-    """How much of a card of brow or lash hairs covers what is behind."""
-    if material == BROW:
-        ends = smoothstep(0.0, 0.14, u) * (1.0 - smoothstep(0.72, 1.0, u))
-        edge = smoothstep(0.0, 0.38, v) * (1.0 - smoothstep(0.55, 1.0, v))
-        hairs = 0.72 + 0.55 * strands(u + 0.12 * v, v, 80.0, pixel_u)
-        return min(1.0, max(0.0, ends * edge * hairs * 1.1))
-    fibre = 0.9 + 0.9 * strands(u + 0.05 * v, 0.0, 110.0, pixel_u)
-    thick = 0.35 if u > 1.5 else 1.2
-    return min(1.0, max(0.0, thick * fibre * (1.0 - v) ** 1.3))
-
-
-@njit(cache=True, nogil=True)
-def shade_cards(
-    scene, colors, lights, screen, nearest, triangle, barycentric, solid, camera, pixel, out
-):
-    """Draws brows and lashes over the picture that `shade` has drawn.
+@subroutine(fast=False)
+def _midst(materials, nearest, triangle, x, y, across, left):
+    """The middle one of the samples of a pixel that belong together, and how many these are.
 
     Args:
-        scene: The posed person.
-        colors: Colours of the person.
-        lights: Lights of the frame.
-        screen: (V, 3) float32 from `to_screen`.
-        nearest: (H, W) float32 nearness of the cards, from `rasterise`.
-        triangle: (H, W) int32 triangles of the cards, from `rasterise`.
-        barycentric: (H, W, 2) float32 of the cards, from `rasterise`.
-        solid: (H, W) float32 nearness of the solid faces, which hide cards behind them.
-        camera: (3,) the camera's centre in canonical head space.
-        pixel: Size of a pixel at the head, metres.
-        out: (H, W, 4) float32 display RGB and alpha, premultiplied; changed where cards cover it.
+        materials: (F,) uint8.
+        nearest: (H·S, W·S) float32 nearness of the samples.
+        triangle: (H·S, W·S) int32 faces of the samples.
+        x: Column of the pixel.
+        y: Row of the pixel.
+        across: S.
+        left: (S²,) bool samples of the pixel that are to be coloured; those found are taken away.
     """
-    height, width = triangle.shape
-    for y in range(height):
-        for x in range(width):
-            f = triangle[y, x]
-            if f < 0 or nearest[y, x] * 1.003 < solid[y, x]:
-                continue
-            v, w = barycentric[y, x, 0], barycentric[y, x, 1]
-            a, b, c = _weights(screen, scene.faces, f, v, w)
-            uv = _uv(scene.corner_uv, f, a, b, c)
-            per_metre = _strand(scene, f, a, b, c)[3]
-            alpha = _card_alpha(scene.materials[f], uv[0], uv[1], pixel * per_metre)
-            n = _mix3(scene.normals, scene.faces, f, a, b, c)
-            n = _unit(n[0], n[1], n[2])
-            if n[2] < 0.0:
-                n = (-n[0], -n[1], -n[2])
-            p = _mix3(scene.vertices, scene.faces, f, a, b, c)
-            t = 0.55 + 0.5 * strands(uv[0], uv[1], 60.0, pixel * per_metre)
-            hair = colors.hair
-            spot = Spot(hair[0] * t, hair[1] * t, hair[2] * t, 0.0, 0.0, 0.3, 0.0)
-            r, g, bl = _lit(spot, lights, n, n, p, 0.9)
-            for channel in range(4):
-                out[y, x, channel] *= 1.0 - alpha
-            out[y, x, 0] += alpha * display(r)
-            out[y, x, 1] += alpha * display(g)
-            out[y, x, 2] += alpha * display(bl)
-            out[y, x, 3] += alpha
+    first, members, middle_x, middle_y = -1, 0, 0.0, 0.0
+    material, near = 0, np.float32(0.0)
+    for s in range(left.shape[0]):
+        if not left[s]:
+            continue
+        row, column = y * across + s // across, x * across + s % across
+        f = triangle[row, column]
+        if first < 0:
+            first, material, near = s, materials[f], nearest[row, column]
+        elif materials[f] != material or abs(nearest[row, column] / near - 1.0) > TOGETHER:
+            continue
+        members += 1
+        middle_x += s % across
+        middle_y += s // across
+        if material in (EYE, TEETH):
+            left[s] = False
+            return s, 1
+    middle_x, middle_y = middle_x / members, middle_y / members
+    best, closest = first, 1e9
+    for s in range(left.shape[0]):
+        if not left[s]:
+            continue
+        row, column = y * across + s // across, x * across + s % across
+        f = triangle[row, column]
+        if materials[f] != material or abs(nearest[row, column] / near - 1.0) > TOGETHER:
+            continue
+        left[s] = False
+        away = (s % across - middle_x) ** 2 + (s // across - middle_y) ** 2
+        if away < closest:
+            best, closest = s, away
+    return best, members

@@ -6,10 +6,10 @@ looks the same in every frame.
 
 import math
 
-from numba import njit
+from ico3d.splat.cpu.compile import kernel, subroutine
 
 
-@njit(cache=True, nogil=True)
+@subroutine()
 def hashed(i, j, k):
     """A pseudo-random number in [0, 1) from three integers."""
     h = (i * 374761393 + j * 668265263 + k * 1274126177) & 0xFFFFFFFF
@@ -18,14 +18,14 @@ def hashed(i, j, k):
     return ((h ^ (h >> 15)) & 0xFFFFFF) / 16777216.0
 
 
-@njit(cache=True, nogil=True)
+@subroutine()
 def smoothstep(low, high, value):
     """0 below `low`, 1 above `high`, a smooth transition between."""
     t = min(1.0, max(0.0, (value - low) / (high - low)))
     return t * t * (3.0 - 2.0 * t)
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def noise(x, y, z):
     """Value noise in [0, 1] with features of size 1."""
     fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
@@ -41,13 +41,33 @@ def noise(x, y, z):
     return near * (1 - w) + far * w
 
 
-@njit(cache=True, nogil=True)
+@kernel()
+def slope(x, y, z):
+    """Value of `noise` and its slopes along x, y and z."""
+    fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
+    i, j, k = int(fx), int(fy), int(fz)
+    u, v, w = x - fx, y - fy, z - fz
+    du, dv, dw = 6 * u * (1 - u), 6 * v * (1 - v), 6 * w * (1 - w)
+    u, v, w = u * u * (3 - 2 * u), v * v * (3 - 2 * v), w * w * (3 - 2 * w)
+    a, b = hashed(i, j, k), hashed(i + 1, j, k)
+    c, d = hashed(i, j + 1, k), hashed(i + 1, j + 1, k)
+    e, f = hashed(i, j, k + 1), hashed(i + 1, j, k + 1)
+    g, h = hashed(i, j + 1, k + 1), hashed(i + 1, j + 1, k + 1)
+    near_low, near_high = a + u * (b - a), c + u * (d - c)
+    far_low, far_high = e + u * (f - e), g + u * (h - g)
+    near, far = near_low + v * (near_high - near_low), far_low + v * (far_high - far_low)
+    along_u = (1 - w) * ((b - a) * (1 - v) + (d - c) * v) + w * ((f - e) * (1 - v) + (h - g) * v)
+    along_v = (1 - w) * (near_high - near_low) + w * (far_high - far_low)
+    return near + w * (far - near), du * along_u, dv * along_v, dw * (far - near)
+
+
+@subroutine()
 def visible(feature, pixel):
     """Visibility, 0 to 1, of a texture with features of this size at this pixel size."""
     return min(1.0, max(0.0, feature / pixel - 1.0))
 
 
-@njit(cache=True, nogil=True)
+@subroutine()
 def grain(x, y, z, feature, pixel):
     """Noise in [-1, 1] with features of `feature` metres; fades out where pixels are larger."""
     fade = visible(feature, pixel)
@@ -56,7 +76,7 @@ def grain(x, y, z, feature, pixel):
     return (2.0 * noise(x / feature, y / feature, z / feature) - 1.0) * fade
 
 
-@njit(cache=True, nogil=True)
+@subroutine()
 def spots(x, y, z, feature, pixel):
     """Round spots in [0, 1], at most one per cell of `feature` metres, of varied size."""
     fade = visible(0.5 * feature, pixel)
@@ -72,7 +92,7 @@ def spots(x, y, z, feature, pixel):
     return fade * (1.0 - smoothstep(0.5 * radius, radius, distance)) * hashed(i, j, k + 404)
 
 
-@njit(cache=True, nogil=True)
+@subroutine()
 def strands(across, along, count, pixel_across):
     """Streaks in [-1, 1] that run along one texture axis.
 

@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from ico3d.splat.cpu.compile import subroutine
 from ico3d.studio.picture.materials import Spot
 from ico3d.studio.picture.textures import grain, noise, smoothstep
 
@@ -15,7 +14,7 @@ GORES = 14
 """Number of panels around a skirt, in two alternating colours."""
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _patch(x, y, z, size, least, pixel):
     """Irregular patches of `size` metres with sharp edges, 0 to 1, the fewer the higher `least`."""
     blur = max(0.03, 0.8 * pixel / size)
@@ -23,7 +22,7 @@ def _patch(x, y, z, size, least, pixel):
     return smoothstep(least - blur, least + blur, value)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def _band(t, width, pixel):
     """Lines of a grid with unit spacing, 0 to 1; `pixel` in units of t."""
     blur = max(0.02, 0.8 * pixel)
@@ -31,7 +30,7 @@ def _band(t, width, pixel):
     return 1.0 - smoothstep(0.5 * width - blur, 0.5 * width + blur, away)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def printed(colors, x, y, z, pixel):
     """A shirt in bands, each sprinkled with patches of the next band's colour."""
     warp = 0.012 * (noise(x / 0.06, y / 0.06, z / 0.06) - 0.5)
@@ -50,10 +49,10 @@ def printed(colors, x, y, z, pixel):
         g + (accent[1] - g) * small,
         b + (accent[2] - b) * small,
     )
-    return Spot(r * shade, g * shade, b * shade, 6.0, 0.02, 0.35, 0.12)
+    return Spot(r * shade, g * shade, b * shade, 0.7, 0.02, 0.35, 0.12, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def trousers(colors, x, y, z, pixel):
     """Checked cloth with worn patches."""
     hip, ankle = colors.legs[0], colors.legs[1]
@@ -72,10 +71,10 @@ def trousers(colors, x, y, z, pixel):
     r = base[0] + (pattern[0] - base[0]) * mark + 0.10 * fine
     g = base[1] + (pattern[1] - base[1]) * mark + 0.05 * fine
     b = base[2] + (pattern[2] - base[2]) * mark + 0.02 * fine
-    return Spot(r * shade, g * shade, b * shade, 6.0, 0.02, 0.3, 0.12)
+    return Spot(r * shade, g * shade, b * shade, 0.7, 0.02, 0.3, 0.12, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def shoe(colors, x, y, z, pixel):
     """A leather shoe with a light sole."""
     floor = colors.floor
@@ -87,17 +86,17 @@ def shoe(colors, x, y, z, pixel):
     r, g, b = colors.shoe[0], colors.shoe[1], colors.shoe[2]
     light = min(1.0, sole + 0.8 * lace)
     r, g, b = r + (0.55 - r) * light, g + (0.53 - g) * light, b + (0.48 - b) * light
-    return Spot(r * shade, g * shade, b * shade, 24.0, 0.04, 0.15, 0.05)
+    return Spot(r * shade, g * shade, b * shade, 0.5, 0.04, 0.15, 0.05, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def sock(x, y, z, pixel):
     """A grey ribbed sock."""
     shade = 1.0 + 0.25 * grain(x, y * 0.2, z, 0.008, pixel)
-    return Spot(0.25 * shade, 0.25 * shade, 0.27 * shade, 6.0, 0.02, 0.3, 0.1)
+    return Spot(0.25 * shade, 0.25 * shade, 0.27 * shade, 0.7, 0.02, 0.3, 0.1, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@subroutine(fast=False)
 def skirt(colors, u, v, x, y, z, pixel):
     """A skirt of panels with patches and bands; u is 0 to 1 once around, v metres downwards."""
     gore = _band(GORES / 2 * u, 0.5, pixel * GORES / 2 / (1.0 + 2.0 * v))
@@ -113,4 +112,4 @@ def skirt(colors, u, v, x, y, z, pixel):
     b = base[2] + (pattern[2] - base[2]) * mark
     part = max(bands, small)
     r, g, b = r + (accent[0] - r) * part, g + (accent[1] - g) * part, b + (accent[2] - b) * part
-    return Spot(r * shade, g * shade, b * shade, 6.0, 0.02, 0.35, 0.12)
+    return Spot(r * shade, g * shade, b * shade, 0.7, 0.02, 0.35, 0.12, 0.0)

@@ -1,0 +1,139 @@
+"""Grows a person's hair as strands, always the same for the same person."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ico3d.studio.person.growing import face, styles
+from ico3d.studio.person.growing.skull import Skull, skull_of
+from ico3d.studio.person.strands import Strands, bound, joined
+from ico3d.studio.person.subject import CARDS, Material, Subject
+
+LONG, SHORT = 14000, 28000
+"""Strands on a head, of long and of short hair."""
+TAIL = 3600
+"""Strands in a tail."""
+RADIUS = 0.00013
+"""Half of a strand's thickness in metres: thicker than real hair, which is more numerous."""
+EDGE = 0.007
+"""Metres over which the hairline thins out."""
+AWAY = 0.03
+"""Hair farther than this from the skin hangs in a tail, metres."""
+
+FREE_TAIL = (
+    (0.10, -0.995),
+    (0.004, -0.022),
+    (-0.006, -0.040),
+    (-0.030, -0.052),
+    (-0.065, -0.055),
+    (-0.110, -0.050),
+    (-0.160, -0.044),
+    (-0.205, -0.042),
+)
+"""A tail of its own: direction (y, z) of the tie from the skull's centre, then places relative to
+the skin there, metres."""
+
+
+def with_hair(subject: Subject) -> Subject:
+    """The person with strands instead of the mesh that stood for hair; bald ones stay bald."""
+    skull = skull_of(subject)
+    if skull is None or not (subject.materials == Material.HAIR).any():
+        return subject
+    random = np.random.default_rng(7)
+    count = SHORT if subject.male else LONG
+    corners, parts = _roots(subject, skull, count, random)
+    roots = np.einsum("nk,nkc->nc", parts, subject.vertices[corners])
+    grown = []
+    if not subject.male:
+        line, width = _tail_line(subject, skull)
+        paths = styles.tied(skull, roots, line[0], random)
+        hanging = styles.tail(line, width, TAIL, random)
+        near = np.argsort(np.linalg.norm(roots - line[0], axis=1))[:300]
+        where = random.choice(near, TAIL)
+        grown.append(
+            _of(subject, corners[where], parts[where], hanging, np.full(TAIL, 1.0), random)
+        )
+    else:
+        paths = styles.short(skull, roots, random)
+    grown.append(_of(subject, corners, parts, paths, skull.inside_hairline(roots), random))
+    brows = face.brows(subject, random)
+    if brows is not None:
+        grown.append(brows)
+    grown.append(face.lashes(subject, random))
+    bare = ~np.isin(subject.materials, (Material.HAIR, *CARDS))
+    return replace(
+        subject,
+        faces=subject.faces[bare],
+        materials=subject.materials[bare],
+        corner_uv=subject.corner_uv[bare],
+        strands=joined(grown),
+    )
+
+
+def _of(
+    subject: Subject,
+    corners: np.ndarray,
+    parts: np.ndarray,
+    paths: styles.Paths,
+    inside: np.ndarray,
+    random: np.random.Generator,
+) -> Strands:
+    """Binds hair whose roots lie `inside` (N,) metres from the hairline, where it is finer."""
+    tone = np.exp(random.normal(0, 0.22, len(corners)))
+    fine = 0.55 + 0.45 * styles.smooth(-0.002, 0.015, inside)
+    return bound(
+        subject.vertices,
+        corners,
+        parts,
+        paths.points,
+        np.exp(-1.9 * paths.depth),
+        RADIUS * paths.taper * fine[:, None],
+        tone,
+        int(Material.HAIR),
+    )
+
+
+def _roots(
+    subject: Subject, skull: Skull, count: int, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (N, 3) and places on them (N, 3): evenly over the scalp, thinner at its edge."""
+    skin = subject.faces[subject.materials == Material.SKIN]
+    middle = subject.vertices[skin].mean(axis=1)
+    skin = skin[skull.inside_hairline(middle) > -0.015]
+    at = subject.vertices[skin].astype(float)  # (F, 3, 3)
+    area = np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
+    chosen = random.choice(len(skin), size=2 * count, p=area / area.sum())
+    u, v = random.random((2, 2 * count))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    parts = np.stack([1 - u - v, u, v], 1)
+    places = np.einsum("nk,nkc->nc", parts, at[chosen])
+    depth = skull.inside_hairline(places) + 0.003 * _ripple(places)
+    kept = np.flatnonzero(random.random(2 * count) < np.clip(0.35 + depth / EDGE, 0, 1))[:count]
+    return skin[chosen[kept]], parts[kept]
+
+
+def _ripple(places: np.ndarray) -> np.ndarray:
+    """(N,) an uneven line, about -1 to 1."""
+    x, y, z = places.T
+    return 0.6 * np.sin(210 * x + 60 * z) + 0.4 * np.sin(470 * x - 330 * z + 200 * y)
+
+
+def _tail_line(subject: Subject, skull: Skull) -> tuple[np.ndarray, np.ndarray]:
+    """Middle (L, 3) and radius (L,) of a tail: of the hair mesh's, or of one that falls freely."""
+    hair = subject.vertices[np.unique(subject.faces[subject.materials == Material.HAIR])]
+    skin = subject.vertices[np.unique(subject.faces[subject.materials == Material.SKIN])]
+    away = hair[KDTree(skin).query(hair)[0] > AWAY]
+    if len(away) > 0.1 * len(hair):
+        levels = np.linspace(away[:, 1].max() - 0.01, away[:, 1].min() + 0.01, 12)
+        slices = [away[np.abs(away[:, 1] - level) < 0.014] for level in levels]
+        line = np.array([np.median(s, axis=0) for s in slices])
+        width = np.array([1.1 * s[:, [0, 2]].std(axis=0).mean() + 0.003 for s in slices])
+    else:
+        first = skull.on(np.array([[0.0, *FREE_TAIL[0]]]), np.zeros(1))
+        line = first + np.array([[0.0, y, z] for y, z in FREE_TAIL[1:]]) * skull.scale
+        width = np.interp(np.linspace(0, 1, len(line)), [0, 0.35, 1], [0.012, 0.021, 0.007])
+    tie = skull.on(styles.unit(line[:1] - skull.centre), np.array([0.010]))  # (1, 3)
+    line, width = np.concatenate([tie, line]), np.concatenate([[0.010], width])
+    width[1] = max(width[1], 0.012)
+    return line, width

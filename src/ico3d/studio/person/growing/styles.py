@@ -1,0 +1,161 @@
+"""Paths of strands on a head: tied back into a tail, or short and falling away from the crown."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ico3d.studio.person.growing.skull import Skull
+
+POINTS, SHORT_POINTS = 18, 8
+"""Points of a strand of long and of short hair."""
+CROWN = np.array([0.0, 0.85, -0.5]) / np.hypot(0.85, 0.5)
+
+
+@dataclass(frozen=True)
+class Paths:
+    """N strands of K points.
+
+    Attributes:
+        points: (N, K, 3) metres.
+        depth: (N, K) 0 at the surface of the hair, 1 at the skin.
+        taper: (N, K) factor of the thickness.
+    """
+
+    points: np.ndarray
+    depth: np.ndarray
+    taper: np.ndarray
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) of length 1."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def smooth(low: float, high: float, value: np.ndarray) -> np.ndarray:
+    """0 below `low`, 1 above `high`, a smooth transition between."""
+    t = np.clip((value - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def clumped(points: np.ndarray, share: float, guides: int, amount: float) -> np.ndarray:
+    """Draws strands (N, K, 3) towards the nearest of some of them, the more the nearer the tip.
+
+    Args:
+        points: (N, K, 3) metres.
+        share: Part of the strand from which on it is drawn.
+        guides: Number of strands that draw others.
+        amount: How near they come at the tip, 0 to 1.
+    """
+    guides = min(guides, len(points))
+    _, nearest = KDTree(points[:guides, 0]).query(points[:, 0])
+    t = np.linspace(0, 1, points.shape[1])
+    weight = (amount * np.clip((t - share) / (1 - share), 0, 1))[None, :, None]
+    return points + weight * (points[nearest] - points)
+
+
+def waves(count: int, length: int, turns: float, random: np.random.Generator) -> np.ndarray:
+    """(count, length, 3) smooth random displacements of about unit size, 0 at the root."""
+    t = np.linspace(0, 1, length)[None, :, None]
+    phase = random.uniform(0, 2 * np.pi, (count, 1, 3))
+    speed = turns * random.uniform(0.6, 1.4, (count, 1, 3))
+    swing = np.sin(2 * np.pi * speed * t + phase) + 0.5 * np.sin(4.4 * np.pi * speed * t - phase)
+    return (swing - swing[:, :1]) * np.minimum(1, 3 * t)
+
+
+def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Generator) -> Paths:
+    """Hair combed from roots (N, 3) over the head to where it is tied, parted in the middle."""
+    count, s = len(roots), skull.scale
+    start, end = unit(roots - skull.centre), unit(tie - skull.centre)
+    t = np.linspace(0, 1, POINTS)
+    angle = np.arccos(np.clip(start @ end, -1, 1))[:, None]  # (N, 1)
+    one, two = np.sin((1 - t) * angle), np.sin(t * angle)  # (N, K)
+    path = unit(one[..., None] * start[:, None] + two[..., None] * end)
+    front = smooth(-0.2, 0.7, start[:, 2]) * smooth(0.0, 0.6, start[:, 1])  # (N,)
+    side = np.sign(start[:, 0] + 1e-9)
+    sweep = np.stack([0.55 * side, -0.20 * np.ones(count), 0.12 * np.ones(count)], 1)
+    bow = np.sin(np.pi * t) * (1 - 0.35 * t)
+    path = unit(path + (front[:, None] * bow)[..., None] * sweep[:, None])
+    level = random.random(count) ** 0.45  # 1: on the surface
+    full = 0.0035 + 0.005 * smooth(0.2, 0.9, path[..., 1]) * np.sin(np.pi * t) ** 0.5
+    full = full + 0.004 * smooth(0.2, 0.8, t)[None]
+    rise = 1 - np.exp(-7 * t)
+    height = s * (0.0006 + rise * full * (0.15 + 0.85 * level[:, None]))
+    points = skull.on(path, height)
+    points = clumped(points, 0.15, 420, 0.55)
+    points += 0.0004 * waves(count, POINTS, 0.5, random)
+    disc = 0.009 * _disc(count, random)  # (N, 3)
+    into = smooth(0.72, 1.0, t)[None, :, None]
+    points = points * (1 - into) + into * (tie + disc)[:, None]
+    depth = (1 - level)[:, None] * rise * np.ones((1, POINTS))
+    taper = np.broadcast_to(0.55 + 0.45 * rise, depth.shape)
+    return Paths(points, depth, taper)
+
+
+def _disc(count: int, random: np.random.Generator) -> np.ndarray:
+    """(count, 3) random points of a unit disc that faces backwards."""
+    radius, turn = np.sqrt(random.random(count)), random.uniform(0, 2 * np.pi, count)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], 1)
+
+
+def tail(line: np.ndarray, width: np.ndarray, count: int, random: np.random.Generator) -> Paths:
+    """A bundle of strands along a line.
+
+    Args:
+        line: (L, 3) middle of the bundle from the tie to the tips, metres.
+        width: (L,) its radius, metres.
+        count: Number of strands.
+        random: Source of all random choices.
+    """
+    points_each = 18
+    along = np.linspace(0, 1, len(line))
+    reach = 1 - 0.30 * random.random(count) ** 2.0  # (N,)
+    t = np.linspace(0, 1, points_each) * reach[:, None]  # (N, K)
+    middle = np.stack([np.interp(t, along, c) for c in line.T], -1)  # (N, K, 3)
+    radius = np.sqrt(random.random(count))
+    turn = random.uniform(0, 2 * np.pi, count)
+    side = np.array([1.0, 0.0, 0.0])
+    back = unit(np.cross(np.gradient(line, axis=0), side))  # (L, 3)
+    back = np.stack([np.interp(t, along, c) for c in back.T], -1)  # (N, K, 3)
+    wide = np.interp(t, along, width) * radius[:, None]  # (N, K)
+    points = middle + (wide * np.cos(turn)[:, None])[..., None] * side
+    points += (wide * np.sin(turn)[:, None])[..., None] * back
+    points = clumped(points, 0.2, 160, 0.7)
+    points += 0.0026 * waves(count, points_each, 1.2, random)
+    depth = np.broadcast_to(((1 - radius) ** 0.8)[:, None], t.shape)
+    taper = np.broadcast_to(1 - 0.75 * np.linspace(0, 1, points_each) ** 3, t.shape)
+    return Paths(points, depth, taper)
+
+
+def short(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Paths:
+    """Short hair: longer on top, swept forward and aside, cropped at the sides and in the neck."""
+    count, s = len(roots), skull.scale
+    start = unit(roots - skull.centre)
+    top = smooth(0.25, 0.72, start[:, 1] + 0.12 * start[:, 2])  # (N,)
+    length = s * (0.014 + 0.048 * top) * random.uniform(0.75, 1.15, count)
+    level = random.random(count) ** 0.7
+    highest = s * (0.005 + 0.017 * top) * (0.2 + 0.8 * level)
+    lean = waves(count, SHORT_POINTS, 0.4, random)[:, -1, 0] * 0.25
+    patch = np.sin(31 * start[:, 0] + 2.0) * np.sin(27 * start[:, 2] + 1.0)
+    step = length / (SHORT_POINTS - 1)
+    feet, foot = [start], start
+    for k in range(1, SHORT_POINTS):
+        away = unit(foot * (foot @ CROWN)[:, None] - CROWN)  # down from the crown
+        aside = np.stack([np.ones(count), np.zeros(count), np.zeros(count)], 1)
+        turned = np.cross(foot, away)
+        flow = away + (0.75 * top * smooth(-0.2, 0.5, foot[:, 2]))[:, None] * aside
+        flow += (lean + 0.30 * patch)[:, None] * turned
+        flow = unit(flow - foot * (flow * foot).sum(1, keepdims=True))
+        upright = 0.35 + 0.65 * k / SHORT_POINTS  # a strand first rises, then lies down
+        foot = unit(foot + flow * (step * upright / skull.radius(foot))[:, None])
+        feet.append(foot)
+    path = np.stack(feet, axis=1)  # (N, K, 3)
+    t = np.linspace(0, 1, SHORT_POINTS)
+    arch = np.sin(np.pi * np.minimum(1, 0.62 * t + 0.0) ** 0.8)
+    height = 0.0005 + highest[:, None] * arch
+    points = skull.on(path, height)
+    points = clumped(points, 0.1, 650, 0.6)
+    points += 0.0006 * waves(count, SHORT_POINTS, 0.45, random)
+    depth = (1 - level)[:, None] * np.clip(0.4 + 0.6 * (1 - t), 0, 1)
+    taper = np.broadcast_to(1 - 0.8 * t**3, depth.shape)
+    return Paths(points, depth, taper)

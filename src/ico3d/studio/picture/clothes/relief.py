@@ -1,0 +1,152 @@
+"""Relief of cloth: heights in metres, as functions of place, that tilt normals and shade valleys.
+
+A `Weave` says where on the cloth a spot lies. Heights are read at three neighbouring spots of one
+triangle, and their differences tilt the normal (Mikkelsen, "Bump mapping unparametrized surfaces on
+the GPU").
+"""
+
+import math
+from typing import NamedTuple
+
+from ico3d.splat.cpu.compile import kernel, subroutine
+from ico3d.studio.picture.textures import hashed, smoothstep, visible
+
+STITCH, ROW = 0.0058, 0.0046
+"""Width and height of a stitch of knitwear, metres."""
+CABLE, STRAND, TWIST = 0.082, 0.0095, 0.080
+"""Distance between two cables, half the width of a cable's strand, length of a twist, metres."""
+TWILL = 0.0021
+"""Distance between two diagonal lines of denim, metres."""
+
+
+class Weave(NamedTuple):
+    """A place on cloth.
+
+    Attributes:
+        u: Metres across the threads.
+        v: Metres along the threads.
+        x: Place in the pattern of folds, across limbs.
+        y: Place in the pattern of folds, along limbs.
+        z: Place in the pattern of folds, across limbs.
+        hem: Distance from the nearest finished edge, in widths of its hem.
+        cosine: Of the turn about that edge.
+        sine: Of the turn about that edge.
+        ribs: Number of ribs around that edge.
+        seam: Distance from the nearest seam, metres.
+        fold: Depth of the folds, metres.
+    """
+
+    u: float
+    v: float
+    x: float
+    y: float
+    z: float
+    hem: float
+    cosine: float
+    sine: float
+    ribs: float
+    seam: float
+    fold: float
+
+
+@subroutine()
+def moved(weave, step, length):
+    """The place `length` times a `step` further; both are a `Weave`."""
+    return Weave(
+        weave.u + length * step.u,
+        weave.v + length * step.v,
+        weave.x + length * step.x,
+        weave.y + length * step.y,
+        weave.z + length * step.z,
+        weave.hem + length * step.hem,
+        weave.cosine + length * step.cosine,
+        weave.sine + length * step.sine,
+        weave.ribs,
+        weave.seam + length * step.seam,
+        weave.fold + length * step.fold,
+    )
+
+
+@kernel()
+def folds(w):
+    """Height of the folds: waves across the limb that lean, swell and end, and finer slanting ones.
+
+    Sums of sines, because their slopes change smoothly: the eye sees every kink of a shaded slope.
+    """
+    if w.fold < 1e-5:
+        return 0.0
+    lean = math.sin(1.9 * w.x + 0.35 * w.y + 1.4 * w.z + 1.0)
+    drift = math.sin(-2.3 * w.x + 0.55 * w.y + 2.1 * w.z + 2.2)
+    swell = 0.5 + 0.5 * math.sin(3.1 * w.x + 0.8 * w.y - 2.6 * w.z + 1.2 * lean + 4.0)
+    first = 0.5 + 0.5 * math.sin(6.2832 * w.y + 1.9 * lean + 1.1 * drift)
+    slant = 9.3 * w.y + 4.6 * w.x + 2.3 * drift
+    second = 0.5 + 0.5 * math.sin(slant)
+    swell = swell * swell * (3.0 - 2.0 * swell)
+    return w.fold * (first * first * (0.25 + 0.95 * swell) + 0.35 * second * (1.0 - swell))
+
+
+@subroutine()
+def knit_height(w, pixel):
+    """Height of ribs at the edges of knitwear, of cables and stitches."""
+    height = 0.0
+    rib = 1.0 - smoothstep(0.94, 1.06, w.hem)
+    if rib > 0.0:
+        round_ = 0.5 + 0.5 * math.cos(w.ribs * math.atan2(w.sine, w.cosine))
+        height += rib * 0.0015 * visible(0.0075, 1.8 * pixel) * round_ * (2.0 - round_)
+        height -= 0.0018 * rib * smoothstep(0.85, 1.0, w.hem)
+        height += 0.0020 * (1.0 - smoothstep(0.0, 0.12, w.hem))
+    if rib < 1.0:
+        height += (1.0 - rib) * cable(w.u, w.v)
+        height += (1.0 - rib) * 0.0011 * visible(ROW, 1.6 * pixel) * stitch(w.u, w.v)
+    return height - 0.0012 * (1.0 - smoothstep(0.0, 0.005, w.seam))
+
+
+@kernel()
+def cable(u, v):
+    """Height of the ropes of stitches that run along knitwear, three side by side."""
+    column = math.floor(u / CABLE + 0.5)
+    if abs(column) > 1.0:
+        return 0.0
+    across = u - column * CABLE
+    if abs(across) > 0.030:
+        return 0.0
+    turn = 6.2832 * v / TWIST + 1.5 * column
+    sway, front = 0.0105 * math.sin(turn), math.cos(turn)
+    height = 0.0
+    for side in (-1.0, 1.0):
+        off = (across - side * sway) / STRAND
+        if abs(off) < 1.0:
+            over = 0.5 + 0.5 * side * front
+            height = max(height, math.sqrt(1.0 - off * off) * (0.0026 + 0.0022 * over))
+    beside = 1.0 - smoothstep(0.0, 0.004, abs(abs(across) - 0.025))
+    return height - 0.0011 * beside
+
+
+@kernel()
+def stitch(u, v):
+    """Stitches that lean towards one another in columns, 0 to 1."""
+    column = u / STITCH - math.floor(u / STITCH) - 0.5
+    leg = 4.0 * (abs(column) - 0.25)
+    phase = 6.2832 * (v / ROW - 1.15 * abs(column))
+    return max(0.0, 1.0 - leg * leg) * (0.62 + 0.38 * math.cos(phase))
+
+
+@subroutine()
+def yarn(u, v):
+    """A number in [0, 1) for each stitch: no two of a hand-dyed yarn are alike."""
+    return hashed(math.floor(u / STITCH), math.floor(v / ROW), 5)
+
+
+@subroutine()
+def denim_height(w, pixel):
+    """Height of a turned hem of denim, of felled seams and the diagonal weave."""
+    height = -0.0008 * smoothstep(0.92, 1.0, w.hem) * (1.0 - smoothstep(1.0, 1.1, w.hem))
+    height += 0.0010 * (1.0 - smoothstep(0.009, 0.011, w.seam))
+    height -= 0.0012 * (1.0 - smoothstep(0.0, 0.0016, w.seam))
+    return height + 0.00022 * visible(TWILL, 2.0 * pixel) * math.sin(twill(w.u, w.v))
+
+
+@subroutine()
+def twill(u, v):
+    """Phase of the diagonal weave."""
+    return 6.2832 * (0.89 * v + 0.45 * u) / TWILL

@@ -1,0 +1,123 @@
+"""Plain clothes: where they end, where they fold, how relief tilts a surface."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ico3d.studio.dress.tailoring import HEM_RIB, RIB, tailored
+from ico3d.studio.person.choice import load_subject
+from ico3d.studio.person.edges import open_loops, without_covered_neck
+from ico3d.studio.person.skeleton import about
+from ico3d.studio.person.subject import Material
+from ico3d.studio.picture.clothes.clothed import STEEPEST, tilted
+from ico3d.studio.picture.clothes.relief import Weave, cable, folds, stitch
+from support.recordings import synthetic_bodies
+
+RINGS, SIDES, RADIUS = 30, 16, 0.05
+
+
+@pytest.fixture(scope="module")
+def sleeve(tmp_path_factory):
+    """Somebody who wears nothing but an open sleeve from the left shoulder to the wrist."""
+    path = synthetic_bodies.write_body(tmp_path_factory.mktemp("people") / "tubes.npz")
+    person = load_subject(str(path), whole=True)
+    bones = person.skeleton
+    assert bones is not None
+    start, elbow, end = (
+        bones.at[bones.index(f"{n}.L")] for n in ("upperarm01", "lowerarm01", "wrist")
+    )
+    along = np.linspace(0, 1, RINGS)[:, None]
+    middle = np.where(along < 0.5, start + 2 * along * (elbow - start), 0)
+    middle += np.where(along >= 0.5, elbow + (2 * along - 1) * (end - elbow), 0)
+    turn = 2 * np.pi * np.arange(SIDES) / SIDES
+    frame = np.linalg.svd((end - start)[None])[2][1:]  # (2, 3) across the arm
+    ring = RADIUS * np.stack([np.cos(turn), np.sin(turn)], 1) @ frame
+    points = (middle[:, None] + ring).reshape(-1, 3)
+    row, column = (i.ravel() for i in np.mgrid[: RINGS - 1, :SIDES])
+    a, b = row * SIDES + column, row * SIDES + (column + 1) % SIDES
+    faces = np.concatenate([np.stack([a, b, a + SIDES], 1), np.stack([b, b + SIDES, a + SIDES], 1)])
+    weights = np.zeros((len(points), len(bones.names)), np.float32)
+    lower = np.repeat(np.clip((along[:, 0] - 0.5) * 8 + 0.5, 0, 1), SIDES)
+    weights[:, bones.index("upperarm01.L")] = 1 - lower
+    weights[:, bones.index("lowerarm01.L")] = lower
+    return replace(
+        person,
+        vertices=points.astype(np.float32),
+        faces=faces.astype(np.int32),
+        materials=np.full(len(faces), Material.CLOTH, np.uint8),
+        corner_uv=np.zeros((len(faces), 3, 2), np.float32),
+        skeleton=replace(bones, weights=weights),
+    )
+
+
+def test_relief_tilts_a_surface_as_its_height_rises():
+    n, one, two = (0.0, 0.0, 1.0), (0.5, 0.1, 0.0), (-0.1, 0.4, 0.0)
+    slope = np.array([0.3, -0.2])
+    rises = [slope @ np.array(edge[:2]) for edge in (one, two)]
+    expected = np.array([-slope[0], -slope[1], 1.0])
+    found = tilted(n, one, two, *rises)
+    np.testing.assert_allclose(found, expected / np.linalg.norm(expected), atol=1e-12)
+    np.testing.assert_allclose(tilted(n, two, one, *rises[::-1]), found, atol=1e-12)
+
+
+def test_relief_is_never_steeper_than_cloth_can_be():
+    n = tilted((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 50.0, 0.0)
+    assert -n[0] / n[2] == pytest.approx(STEEPEST)
+
+
+def test_clothes_end_in_loops_and_ribs_are_counted_around_them(sleeve):
+    fields, ends = tailored(sleeve).fields, (slice(0, SIDES), slice(-SIDES, None))
+    assert len(open_loops(sleeve, Material.CLOTH)) == 2
+    for end in ends:
+        np.testing.assert_allclose(fields[end, 3], 0, atol=1e-6)
+        assert (fields[end, 6] == round(2 * np.pi * RADIUS / RIB)).all()
+        turn = np.unwrap(np.arctan2(*fields[end, 5:3:-1].T))
+        np.testing.assert_allclose(np.abs(np.diff(turn)), 2 * np.pi / SIDES, rtol=0.2)
+    middle = fields[(RINGS // 2) * SIDES]
+    assert middle[3] * HEM_RIB > 0.15
+
+
+def test_a_bent_elbow_pushes_cloth_into_folds_there(sleeve):
+    bones, cut = sleeve.skeleton, tailored(sleeve)
+    rest = cut.folds(sleeve.vertices)
+    np.testing.assert_allclose(rest, cut.loose, atol=1e-5)
+    rotations = np.tile(np.eye(3), (1, len(bones.names), 1, 1))
+    elbow = bones.index("lowerarm01.L")
+    rotations[:, elbow] = about(np.array([0.0, 1.0, 0.0]), np.array(-1.8))
+    bent = bones.skinned(sleeve.vertices, bones.matrices(rotations, np.zeros((1, 3)))[0])
+    deeper = cut.folds(bent) - rest
+    assert deeper.max() > 1e-3
+    assert np.linalg.norm(sleeve.vertices[deeper.argmax()] - bones.at[elbow]) < 0.09
+    np.testing.assert_allclose(deeper[: 8 * SIDES], 0, atol=1e-5)
+
+
+def test_folds_are_as_deep_as_asked_and_none_where_none_are():
+    flat = Weave(0.0, 0.0, 0.0, 0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 9.0, 0.0)
+    assert folds(flat) == 0.0
+    spots = np.random.default_rng(0).uniform(-4, 4, (300, 3)).tolist()
+    heights = np.array([folds(flat._replace(x=x, y=y, z=z, fold=0.004)) for x, y, z in spots])
+    assert (heights >= 0).all() and 0.003 < heights.max() < 0.0065 and np.ptp(heights) > 0.002
+
+
+def test_knitwear_repeats():
+    for u, v in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 2)):
+        assert stitch(u + 0.0058, v) == pytest.approx(stitch(u, v), abs=1e-9)
+        assert cable(u, v + 0.08) == pytest.approx(cable(u, v), abs=1e-6)
+    assert cable(0.2, 0.0) == 0.0  # only three cables run side by side
+
+
+def test_skin_far_below_a_collar_is_left_out(sleeve):
+    edge = sleeve.vertices[:SIDES].mean(axis=0)
+    patch = np.array([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]], np.float32)
+    patches = [patch + (edge - [0, drop, 0]).astype(np.float32) for drop in (0.09, -0.05, 0.4)]
+    count, new = len(sleeve.vertices), np.arange(9, dtype=np.int32).reshape(3, 3)
+    more = replace(
+        sleeve,
+        vertices=np.concatenate([sleeve.vertices, *patches]),
+        faces=np.concatenate([sleeve.faces, count + new]),
+        materials=np.append(sleeve.materials, np.full(3, Material.SKIN, np.uint8)),
+        corner_uv=np.concatenate([sleeve.corner_uv, np.zeros((3, 3, 2), np.float32)]),
+    )
+    kept = without_covered_neck(more).faces
+    np.testing.assert_array_equal(kept, np.concatenate([sleeve.faces, count + new[1:]]))

@@ -1,0 +1,76 @@
+"""Light of the studio: shadows as wide as lamps make them, surroundings, film."""
+
+import numpy as np
+import pytest
+
+from ico3d.studio.picture.lamps import STUDIOS, Lamps
+from ico3d.studio.picture.lighting import ambient, lights_on
+from ico3d.studio.picture.shadows import Covered, cast, seen
+from ico3d.studio.picture.tones import developed, display
+
+DOWN = np.array([0.0, 1.0, 0.0])
+SIZE, GAP = 0.2, 0.1
+"""Tangent of half the angle of a lamp, and metres from the edge of a roof to the floor."""
+
+
+@pytest.fixture(scope="module")
+def roof():
+    """The shadow of a roof over all x < 0 under a lamp straight above."""
+    corners = np.array([[-9, 0, -9], [0, 0, -9], [0, 0, 9], [-9, 0, 9]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    covered = Covered(512, 0.3, np.zeros(3), False)
+    return cast(corners, faces, np.arange(2, dtype=np.int32), DOWN, SIZE, covered, np.zeros(3))
+
+
+def test_a_penumbra_is_as_wide_as_lamp_and_distance_make_it(roof):
+    at = np.linspace(-0.06, 0.06, 49)
+    share = np.array([seen(roof, x, -GAP, 0.01, 0.0, 1.0, 0.0) for x in at])
+    # A disc that an edge covers up to t, of its radius, shows this share.
+    t = np.clip(at / (SIZE * GAP), -1, 1)
+    expected = 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
+    assert np.abs(share - expected).max() < 0.08
+    np.testing.assert_allclose(share[[0, -1]], [0, 1], atol=1e-6)
+
+
+def test_a_lit_surface_throws_no_shadow_on_itself(roof):
+    for tilt in (0.0, 0.8, -0.8):
+        n = np.array([np.sin(tilt), np.cos(tilt), 0.0])
+        assert seen(roof, -0.1, 0.003, 0.0, *n) == 1.0
+
+
+def test_surroundings_of_one_colour_light_every_side_alike():
+    even = np.full(3, 0.3)
+    lamps = Lamps(np.eye(3), np.zeros((3, 3)), np.full(3, 0.2), even, 0 * even, even, even)
+
+    class White(Lamps):
+        def surroundings(self, directions):
+            return np.full((len(directions), 3), 0.3)
+
+    harmonics = White(**{k: getattr(lamps, k) for k in lamps.__dataclass_fields__}).harmonics()
+    np.testing.assert_allclose(harmonics[1:], 0, atol=1e-3)
+    np.testing.assert_allclose(0.282095 * harmonics[0], 0.3, atol=1e-3)
+
+
+def test_light_turns_with_the_world_not_with_the_head():
+    turn = np.eye(4)
+    turn[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    triangle = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], np.float32)
+    faces, one = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
+    small = Covered(16, 0.4, np.zeros(3), False)
+    straight, turned = (
+        lights_on(triangle, faces, one, pose, STUDIOS["warm"], small) for pose in (np.eye(4), turn)
+    )
+    n = np.array([0.6, 0.0, 0.8])
+    there = turn[:3, :3].T @ n  # the same direction of the world in a turned head's space
+    np.testing.assert_allclose(ambient(straight, n), ambient(turned, there), rtol=1e-5)
+    np.testing.assert_allclose(turned.directions @ turn[:3, :3].T, straight.directions, atol=1e-6)
+
+
+def test_film_keeps_black_and_order_and_a_pixel_keeps_its_share():
+    light = np.linspace(0, 6, 200)
+    shown = np.array([display(x) for x in light])
+    assert shown[0] == 0 and shown[-1] <= 1 and (np.diff(shown) >= 0).all()
+    picture = np.array([[[0.2, 0.1, 0.05, 0.5], [0, 0, 0, 0]]], np.float32)
+    out = developed(picture)
+    np.testing.assert_allclose(out[0, 0, :3], 0.5 * np.array([display(x) for x in (0.4, 0.2, 0.1)]))
+    assert out[0, 0, 3] == 0.5 and (out[0, 1] == 0).all()
