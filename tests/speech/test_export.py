@@ -25,6 +25,8 @@ def builtin():
     torch.manual_seed(3)
     encoder = load_encoder()
     adaptor = SpeechAdaptor(encoder.size)
+    adaptor.lips.copy_(torch.randn_like(adaptor.lips).mul(0.02).half())
+    torch.nn.init.normal_(adaptor.lips_rest)
     return encoder, adaptor, export_speech(adaptor, encoder)
 
 

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from ico3d.measure.alignment import aligned, transcripts
+from ico3d.speech.articulation import ARTICULATION, articulation_track
 from ico3d.speech.encoder import BUILTIN_FILE, load_encoder
-from ico3d.speech.training.targets import ARTICULATION, articulation_track
 from ico3d.speech.training.train_encoder import load_readout
 from support.shared import SPEECH
 

@@ -11,6 +11,7 @@ import tyro
 
 from ico3d.bundle import packaged
 from ico3d.chat.observing.operator_log import set_up_log
+from ico3d.errors import SettingsError
 
 if TYPE_CHECKING:
     from ico3d.chat.settings.embedding import Embedding
@@ -139,6 +140,10 @@ class Demo:
         persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
         open: Open the page in a browser.
         verbose: Print all log messages, including what visitors say.
+        natural: Listen with Whisper, think with the persona's notes and a small language model,
+            and speak with a natural voice, in English; what is missing is installed first, after
+            its sizes and licences have been shown and you have agreed.
+        yes: Agree to that without being asked.
     """
 
     host: str = "127.0.0.1"
@@ -147,15 +152,29 @@ class Demo:
     persona: Path | None = None
     open: bool = True
     verbose: bool = False
+    natural: bool = False
+    yes: bool = False
 
     def run(self) -> None:
         """Serves the packaged avatar until interrupted.
 
         Raises:
             BundleError: If this installation of the package has no avatar.
+            SettingsError: If both a settings file and the natural conversation are asked for, or
+                nobody agrees to what the latter needs.
+            DownloadError: If that cannot be installed.
         """
         demo = Path(packaged.NAME)
-        where = (self.host, self.port, self.settings, self.persona)
+        settings = self.settings
+        if self.natural:
+            from ico3d.chat.natural.needs import SETTINGS
+            from ico3d.chat.natural.setup import prepare
+
+            if settings is not None:
+                raise SettingsError(f"--natural has settings of its own: copy {SETTINGS}.")
+            prepare(self.yes)
+            settings = SETTINGS
+        where = (self.host, self.port, settings, self.persona)
         Serve(demo, *where, open=self.open, verbose=self.verbose).run()
 
 
@@ -179,4 +198,5 @@ def described(services, offers) -> list[str]:
         lines += [f"    better: {o.name}; {o.hindrance}" for o in better if o.hindrance]
     if stand_ins:
         lines.append("  (small offline stand-ins; choose others with --settings)")
+        lines.append("  natural, in English, for about 265 MB more: ico3d demo --natural")
     return lines

@@ -7,6 +7,7 @@ import numpy as np
 from pipecat.frames.frames import DataFrame, Frame, InputAudioRawFrame, SystemFrame
 
 from ico3d.chat.wire.protocol import SPEECH_RATE, ClientMessage
+from ico3d.common.espeak import Phoneme
 
 Message = TypeVar("Message")
 
@@ -32,6 +33,22 @@ class SpeechFrame(DataFrame):
     expressions: np.ndarray
     text: str | None = None
     ends_sentence: bool = False
+
+
+@dataclass
+class PhonemesFrame(DataFrame):
+    """The speech sounds of a stretch of speech; comes before the stretch's first sound.
+
+    Parameters:
+        phonemes: The speech sounds in the order of time; each lasts until the next one begins.
+            Their times count from the first sample of the stretch.
+        seconds: Duration of the stretch.
+        context_id: pipecat's name of the answer that the stretch belongs to.
+    """
+
+    phonemes: tuple[Phoneme, ...]
+    seconds: float
+    context_id: str | None = None
 
 
 @dataclass

@@ -6,7 +6,7 @@ Nothing is downloaded here; only the command `ico3d weights fetch NAME` does tha
 import os
 from pathlib import Path
 
-from ico3d.common.catalogue.kinds import Weights
+from ico3d.common.catalogue.kinds import FilesPackage, Weights
 from ico3d.common.catalogue.table import TABLE
 from ico3d.errors import MissingModelError, SettingsError
 
@@ -54,6 +54,8 @@ def cached(name: str) -> Path | None:
     weights = weights_named(name)
     if weights.repository:
         return _repository_folder(weights)
+    if isinstance(weights.package, FilesPackage):
+        return _packaged_folder(weights.package)
     for folder in model_folders():
         if all((folder / file.name).is_file() for file in weights.files):
             return folder / weights.files[0].name if len(weights.files) == 1 else folder
@@ -103,6 +105,14 @@ def how_to_get(file: str) -> str:
             verb = f"ico3d weights fetch {weights.name}"
             return f"fetch it with {verb} ({weights.licence}), or {place}"
     return place
+
+
+def _packaged_folder(package: FilesPackage) -> Path | None:
+    """The folder of files that came out of a package, if none of them is missing."""
+    for folder in model_folders():
+        if all((folder / package.folder / name).is_file() for name in package.kept):
+            return folder / package.folder
+    return None
 
 
 def _repository_folder(weights: Weights) -> Path | None:

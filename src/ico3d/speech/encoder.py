@@ -2,7 +2,7 @@
 
 import hashlib
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -42,6 +42,8 @@ class FrozenEncoder:
         input: What the network reads: `mel` windows, or windows of the `sound` itself (see
             `blocks`).
         vectors: Number of vectors that are concatenated to the D features of a row.
+        articulation: Weight (5, D) and bias (5,) by which features tell the lips' articulation
+            (`articulation.ARTICULATION`); None where nothing was learnt to read it.
     """
 
     name: str
@@ -50,6 +52,7 @@ class FrozenEncoder:
     network: nn.Module
     input: Literal["mel", "sound"] = "mel"
     vectors: int = 1
+    articulation: tuple[torch.Tensor, torch.Tensor] | None = None
 
     @torch.no_grad()
     def features(self, samples: np.ndarray, rate: int, device: torch.device = CPU) -> np.ndarray:
@@ -108,7 +111,11 @@ def load_builtin(path: Path) -> FrozenEncoder:
 
     data = _read(path)
     state = {key: value.float() for key, value in load(data).items() if "readout" not in key}
-    return _frozen("builtin", BuiltinEncoder(), state, data, path)
+    encoder = _frozen("builtin", BuiltinEncoder(), state, data, path)
+    read = [load(data).get(f"readout.articulation.{name}") for name in ("weight", "bias")]
+    if read[0] is None or read[1] is None:
+        return encoder
+    return replace(encoder, articulation=(read[0].float(), read[1].float()))
 
 
 def load_ave(path: Path) -> FrozenEncoder:

@@ -16,6 +16,7 @@ from ico3d.speech.network import (
     AFTER,
     ATTENTION_WINDOW,
     BEFORE,
+    CONTEXT,
     SPEECH_SIZE,
     AudioAttNet,
     AudioEncoder,
@@ -24,7 +25,7 @@ from ico3d.speech.network import (
     SequenceAdaptor,
     SpeechAdaptor,
 )
-from ico3d.speech.runtime import served_name
+from ico3d.speech.runtime import TOLD, served_name
 
 _OPSET = 17
 _IR_VERSION = 8
@@ -45,11 +46,15 @@ def export_speech(adaptor: SpeechAdaptor, encoder: FrozenEncoder) -> bytes:
             takes their features as its input.
 
     Returns:
-        An ONNX model from `mel` (T, 80, 16) or `features` (T, D) to `expression` (T, 32).
+        An ONNX model from `mel` (T, 80, 16) or `features` (T, D) to `expression` (T, 32). Where the
+        encoder's features tell the lips' articulation, it takes what is known of that, too: `told`
+        (T, 6), five values and how far they count, 0 to 1; without that input nothing is known.
     """
     graph = _Graph()
     if encoder.name == "builtin":
         features = _encoder(graph, encoder.network, graph.input("mel", [_ROWS, MELS, WINDOW]))
+        if encoder.articulation is not None:
+            features = _corrected(graph, features, *encoder.articulation)
     else:
         features = graph.input("features", [_ROWS, encoder.size])
     return graph.model(_adaptor(graph, adaptor, features), "expression", SPEECH_SIZE)
@@ -93,11 +98,17 @@ class _Graph:
         self._inputs = []
         self._count = 0
 
-    def input(self, name: str, shape: list[int | str]) -> str:
+    def input(self, name: str, shape: list[int | str | None]) -> str:
         """Declares a float32 input."""
         kind = self._onnx.TensorProto.FLOAT
         self._inputs.append(self._onnx.helper.make_tensor_value_info(name, kind, shape))
         return name
+
+    def told(self, width: int) -> str:
+        """Declares the input `told` (T, width), which is a row of zeros unless it is given."""
+        zeros = np.zeros((1, width), np.float32)
+        self._weights.append(self._onnx.numpy_helper.from_array(zeros, TOLD))
+        return self.input(TOLD, [None, width])
 
     def weight(self, value: torch.Tensor | np.ndarray) -> str:
         """Stores a constant."""
@@ -191,20 +202,55 @@ def _encoder(graph: _Graph, network: nn.Module, mel: str) -> str:
     return x
 
 
+def _corrected(graph: _Graph, features: str, weight: torch.Tensor, bias: torch.Tensor) -> str:
+    """Features (T, D), moved as little as makes them tell the articulation that is known.
+
+    Features tell a = W f + b. What is known is told instead by f + Wᵀ (W Wᵀ)⁻¹ (known − a).
+    """
+    count = len(bias)
+    known = graph.told(count + 1)  # (T, 6) or (1, 6)
+    columns = graph.ints(0), graph.ints(count), graph.ints(1)
+    values = graph.add("Slice", known, *columns)  # (T, 5)
+    columns = graph.ints(count), graph.ints(count + 1), graph.ints(1)
+    part = graph.add("Slice", known, *columns)  # (T, 1)
+    negative = graph.add("Gemm", features, graph.weight(-weight), graph.weight(-bias), transB=1)
+    missing = graph.add("Mul", graph.add("Add", values, negative), part)  # (T, 5)
+    back = torch.linalg.pinv(weight)  # (D, 5)
+    moved = graph.add("MatMul", missing, graph.weight(back.T.contiguous()))  # (T, D)
+    return graph.add("Add", features, moved)
+
+
 def _adaptor(graph: _Graph, network: SpeechAdaptor, features: str) -> str:
     """Features (T, D) to expressions (T, 32)."""
     padded = graph.add("Pad", features, graph.ints(BEFORE, 0, AFTER, 0))  # (T + 7, D)
+    lips = _lips(graph, network, padded) if network.lips.any() else None
     if isinstance(network.adaptor, SequenceAdaptor):
         padded = _vectors(graph, padded, network.size, network.vectors)  # (T + 7, D / v, v)
     adapted = graph.sequence(network.adaptor, padded)  # (T + 7, 32)
     shifted = []
     for offset in range(ATTENTION_WINDOW):
-        last = offset - ATTENTION_WINDOW + 1
-        end = graph.ints(last if last else np.iinfo(np.int64).max)
-        row = graph.add("Slice", adapted, graph.ints(offset), end, graph.ints(0))  # (T, 32)
+        row = _shifted(graph, adapted, offset)  # (T, 32)
         shifted.append(graph.add("Unsqueeze", row, graph.ints(2)))  # (T, 32, 1)
     windows = graph.add("Concat", *shifted, axis=2)  # (T, 32, 8)
-    return _attention(graph, network.attention, windows)
+    expression = _attention(graph, network.attention, windows)
+    return expression if lips is None else graph.add("Add", expression, lips)
+
+
+def _lips(graph: _Graph, network: SpeechAdaptor, padded: str) -> str:
+    """Features with rows around, (T + 7, D), to what they tell about the lips, (T, 32)."""
+    near = []
+    for offset in range(BEFORE - CONTEXT, BEFORE + CONTEXT + 1):
+        near.append(_shifted(graph, padded, offset))  # (T, D)
+    rows = graph.add("Concat", *near, axis=1)  # (T, 5 · D)
+    weight, rest = graph.weight(network.lips), graph.weight(network.lips_rest)
+    return graph.add("Gemm", rows, weight, rest, transB=1)
+
+
+def _shifted(graph: _Graph, rows: str, offset: int) -> str:
+    """Rows `offset` to `offset` + T − 1 of (T + 7, C)."""
+    last = offset - ATTENTION_WINDOW + 1
+    end = graph.ints(last if last else np.iinfo(np.int64).max)
+    return graph.add("Slice", rows, graph.ints(offset), end, graph.ints(0))
 
 
 def _vectors(graph: _Graph, features: str, size: int, vectors: int) -> str:

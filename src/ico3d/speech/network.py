@@ -12,8 +12,12 @@ from ico3d.speech.runtime import AFTER, BEFORE
 AVE_SIZE = 512
 BUILTIN_SIZE = 64
 ATTENTION_WINDOW = BEFORE + 1 + AFTER
+CONTEXT = 2
+"""Rows before and after a row from which `SpeechAdaptor.lips` reads."""
 
 _SLOPE = 0.02  # of the leaky ReLUs
+_HERE = 6.0
+"""Score by which the attention begins at the row itself, which gets 98 % of the weight."""
 
 
 class ConvBlock(nn.Module):
@@ -178,7 +182,11 @@ class AudioAttNet(nn.Module):
     """
 
     def __init__(self):
-        """Builds the layers with random weights."""
+        """Builds the layers with random weights, and attends to the row itself at first.
+
+        An even attention would be the mean of 0.32 s, in which strokes of the lips drown, and whose
+        middle lies 20 ms in the past.
+        """
         super().__init__()
         channels = (SPEECH_SIZE, 16, 8, 4, 2, 1)
         layers: list[nn.Module] = []
@@ -186,6 +194,8 @@ class AudioAttNet(nn.Module):
             layers += [nn.Conv1d(inputs, outputs, 3, padding=1), nn.LeakyReLU(_SLOPE)]
         self.convolutions = nn.Sequential(*layers)
         self.scores = nn.Linear(ATTENTION_WINDOW, ATTENTION_WINDOW)
+        with torch.no_grad():
+            self.scores.bias[BEFORE] += _HERE
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
         """Maps windows of rows (b, 8, 32) to rows (b, 32)."""
@@ -197,15 +207,21 @@ class AudioAttNet(nn.Module):
 class SpeechAdaptor(nn.Module):
     """The speech part of a person's head: D encoder features to 32 expression values.
 
-    The network is an adaptor followed by an attention and is trained together with the head. Row i
-    of features and expressions belongs to time i/25 s.
+    The network is an adaptor followed by an attention, as in SyncTalk, and is trained together with
+    the head. A linear reading of the person's lips is added (`lip_reading`), which does not change
+    during that training. Row i of features and expressions belongs to time i/25 s.
 
     Attributes:
         size: D, features per row.
         vectors: Number of vectors per row, with D / vectors values each.
         adaptor: Applied to each row.
         attention: Applied to rows [i − 4, i + 4) of the adapted features.
+        lips: (32, 5 · D) weights of rows i − 2 to i + 2 of the features; 0 where nothing was read.
+        lips_rest: (32,) what is added to that.
     """
+
+    lips: torch.Tensor
+    lips_rest: torch.Tensor
 
     def __init__(self, size: int, vectors: int = 1):
         """Takes D, the features per row, and the number of vectors that D is made of."""
@@ -213,16 +229,33 @@ class SpeechAdaptor(nn.Module):
         self.size, self.vectors = size, vectors
         self.adaptor = Adaptor(size) if vectors == 1 else SequenceAdaptor(size, vectors)
         self.attention = AudioAttNet()
+        self.register_buffer("lips", torch.zeros(SPEECH_SIZE, (2 * CONTEXT + 1) * size))
+        self.register_buffer("lips_rest", torch.zeros(SPEECH_SIZE))
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
         """Windows (b, 8, D) of feature rows i − 4 to i + 3 to expression values (b, 32)."""
-        return self.attention(self.adaptor(windows))
+        return self.attention(self.adaptor(windows)) + self._lips(windows)
 
     def track(self, features: torch.Tensor) -> torch.Tensor:
         """Features of a whole sound (T, D) to expression values (T, 32)."""
-        adapted = self.adaptor(_padded(features))  # (T + 7, 32)
-        windows = adapted.unfold(0, ATTENTION_WINDOW, 1).transpose(1, 2)  # (T, 8, 32)
-        return self.attention(windows)
+        padded = _padded(features)  # (T + 7, D)
+        windows = padded.unfold(0, ATTENTION_WINDOW, 1).transpose(1, 2)  # (T, 8, D)
+        adapted = self.adaptor(padded).unfold(0, ATTENTION_WINDOW, 1).transpose(1, 2)  # (T, 8, 32)
+        return self.attention(adapted) + self._lips(windows)
+
+    def restore(self, state: dict[str, torch.Tensor]) -> None:
+        """Takes over what `state_dict` returned; earlier versions read no lips.
+
+        Raises:
+            RuntimeError: If the state is that of another network.
+        """
+        nothing = {name: torch.zeros_like(value) for name, value in self.named_buffers()}
+        self.load_state_dict(nothing | state)
+
+    def _lips(self, windows: torch.Tensor) -> torch.Tensor:
+        """What windows (b, 8, D) tell about the lips: (b, 32)."""
+        near = windows[:, BEFORE - CONTEXT : BEFORE + CONTEXT + 1]  # (b, 5, D)
+        return near.flatten(1) @ self.lips.T + self.lips_rest
 
 
 def feature_windows(features: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:

@@ -1,24 +1,28 @@
 """From sound to expression values on a server: numpy and onnxruntime, no torch."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from ico3d.common.catalogue.table import TABLE
+from ico3d.common.espeak import Phoneme
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.common.weights import find_model, model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, ModelError
 from ico3d.speech.blocks import BlockStream
 from ico3d.speech.mel import RATE
+from ico3d.speech.phonemes import TimedPhonemes
 from ico3d.speech.silence import SilenceGate
 from ico3d.speech.stream import WindowStream
 
 _LARGE = 10**8  # bytes
 
 BEFORE, AFTER = 4, 3  # rows that the attention sees around each: [i − 4, i + 4)
+TOLD = "told"
+"""Input of a graph for what is known of the lips' articulation; not all graphs have it."""
 
 
 class RowStream(Protocol):
@@ -65,6 +69,7 @@ class SpeechModel:
                 raise ModelError(
                     f"the speech encoder gives {size} features, this avatar needs {wanted}."
                 )
+        self.takes_phonemes = TOLD in [i.name for i in self._model.get_overridable_initializers()]
         self.silent_input = self._silence()
         silent = np.repeat(self.silent_input[None], BEFORE + 1 + AFTER, axis=0)
         self.silent_expression = self.run(silent)[BEFORE]  # (32,)
@@ -86,9 +91,17 @@ class SpeechModel:
         """A stream that turns a new sound of `rate` samples per second into rows for `run`."""
         return WindowStream(rate) if self._encoder is None else self._encoder.stream(rate)
 
-    def run(self, rows: np.ndarray) -> np.ndarray:
-        """Mel windows (T, 80, 16) or features (T, D) to expression values (T, 32)."""
-        return self._model.run(None, {self._input: rows})[0]
+    def run(self, rows: np.ndarray, told: np.ndarray | None = None) -> np.ndarray:
+        """Mel windows (T, 80, 16) or features (T, D) to expression values (T, 32).
+
+        Args:
+            rows: What is heard.
+            told: (T, 6) what is known of the articulation (`TimedPhonemes.rows`); None for nothing.
+        """
+        given = {self._input: rows}
+        if told is not None and self.takes_phonemes:
+            given[TOLD] = told
+        return self._model.run(None, given)[0]
 
     def _silence(self) -> np.ndarray:
         """The row that is amid long silence."""
@@ -174,12 +187,22 @@ class StreamingExpressions:
         self._model = model
         self._stream = model.stream(rate)
         self._gate = SilenceGate(rate)
+        self._phonemes = TimedPhonemes()
+        self._rate, self._heard = rate, 0
         self._rows = self._silence(BEFORE)  # inputs of the graph from row `_next` − BEFORE on
         self._next = 0  # the row that is returned next
+
+    def tell(self, phonemes: Sequence[Phoneme], seconds: float) -> None:
+        """Says which phonemes the next seconds of sound hold, before the first of its samples.
+
+        The mouth then follows them and the sound together, if the model can.
+        """
+        self._phonemes.add(phonemes, self._heard / self._rate, seconds)
 
     def push(self, samples: np.ndarray) -> np.ndarray:
         """Adds samples (S,); returns the rows (n, 32) that are now known."""
         self._gate.push(samples)
+        self._heard += len(samples)
         return self._advance(self._stream.push(samples))
 
     def finish(self) -> np.ndarray:
@@ -197,7 +220,8 @@ class StreamingExpressions:
         ready = len(self._rows) - BEFORE - AFTER
         if ready <= 0:
             return np.zeros((0, SPEECH_SIZE), np.float32)
-        rows = self._model.run(self._rows)[BEFORE : BEFORE + ready]  # (ready, 32)
+        told = self._phonemes.rows(self._next - BEFORE, len(self._rows))
+        rows = self._model.run(self._rows, told)[BEFORE : BEFORE + ready]  # (ready, 32)
         gains = self._gate.gains(self._next, ready)[:, None]  # (ready, 1)
         self._rows = self._rows[ready:]
         self._next += ready

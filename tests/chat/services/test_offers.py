@@ -55,6 +55,7 @@ def test_the_start_says_what_serves_and_what_would_be_better():
         "  speaks with espeak-ng",
         f"    better: Best; {MISSING}",
         "  (small offline stand-ins; choose others with --settings)",
+        "  natural, in English, for about 265 MB more: ico3d demo --natural",
     ]
 
 

@@ -7,7 +7,6 @@ from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.assemble import Assembly
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.recolour import RecolourSettings
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.body.settings import settings_for
 from ico3d.capture.face.region import HeadRegion
@@ -26,8 +25,7 @@ TINY = {
     "finetune.steps": 0,
     "checkpoint_every": 60,
 }
-JOINING = JoiningSettings(color_steps=120, border_points=60)
-RECOLOUR = RecolourSettings(steps=150)
+JOINING = JoiningSettings(border_points=60)
 
 
 def assembly_of(head: Path, **joining) -> Assembly:

@@ -9,6 +9,7 @@ import numpy as np
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
 from ico3d.capture.multiview.writing import shown
+from ico3d.capture.posing.facing import facing
 from ico3d.capture.posing.fitting.body import Body, Kinematics, mixed
 from ico3d.capture.posing.fitting.gauss_newton import Plan, Solver
 from ico3d.capture.posing.fitting.rows import LandmarkTerm
@@ -110,6 +111,7 @@ def fit(
     for plan in PLANS:
         solver.run(body, plan, done)
     track = _track(capture, kinematics, surface, body, frames, evidence.source)
+    track = facing(track, [capture.world_from_head(f) for f in range(capture.num_frames)])
     off, outside = np.full((2, capture.num_frames), np.nan)
     for place, frame in enumerate(frames):
         posed = kinematics.posed(body, place)

@@ -74,6 +74,7 @@ class LayerCache:
         self._kept: dict[Key, Layers] = {}
         self._stored: dict[Key, Stored] = {}
         self._coming: dict[Key, Future[Layers | None]] = {}
+        self._queue: deque[Future[Layers | None]] = deque()  # what is not read yet, in order
         self._current: tuple[Key, Layers] | None = None
         self._lost: set[Key] = set()
         self._expected = 0  # steps before this one have been asked for
@@ -90,17 +91,20 @@ class LayerCache:
         first = steps.start
         if not first <= self._expected <= first + HORIZON:
             self._expected = first
-        room = self.budget.left() // self._typical if self._typical else 0
-        queued = sum(not coming.done() for coming in self._coming.values())
+        while self._queue and self._queue[0].done():  # counting all that come takes milliseconds
+            self._queue.popleft()
+        room = None
         for step in range(self._expected, min(steps.stop, first + HORIZON)):
-            full = len(self._coming) >= room or queued >= QUEUED
-            if step >= first + AHEAD and full:
-                break
-            self._expected = step + 1
             key = _key(view(step))
             if not (key in self._kept or key in self._coming or key in self._lost):
+                if room is None:  # asking the system takes as long as drawing a small picture
+                    room = self.budget.left() // self._typical if self._typical else 0
+                full = len(self._coming) >= room or len(self._queue) >= QUEUED
+                if step >= first + AHEAD and full:
+                    break
                 self._coming[key] = self._readers.submit(self._load, *key)
-                queued += 1
+                self._queue.append(self._coming[key])
+            self._expected = step + 1
 
     def readable(self, views: Sequence[View], place: int) -> View:
         """The view at a place, or the next one whose picture can be read.

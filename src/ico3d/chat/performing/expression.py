@@ -18,7 +18,7 @@ from pipecat.frames.frames import (
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from pipecat.utils.text.base_text_aggregator import TextType
 
-from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
+from ico3d.chat.frames import PhonemesFrame, SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.performing.face import MOST, ROW, Face, Piece, Sentence
 from ico3d.chat.wire.protocol import EXPRESSION_FPS
 from ico3d.chat.workers import Run, at_once
@@ -60,6 +60,7 @@ class ExpressionProcessor(FrameProcessor):
         self._utterance = None
         self._sentence: Sentence | None = None
         self._text: str | None = None  # of the sentence that comes next
+        self._told: PhonemesFrame | None = None  # of the sound that comes next
         self._next_row = 0
         self._start = 0.0
 
@@ -89,6 +90,8 @@ class ExpressionProcessor(FrameProcessor):
         elif isinstance(frame, TTSTextFrame):
             if frame.text_type == TextType.SENTENCE:  # single words come in the middle of sound
                 await self._end_sentence()
+        elif isinstance(frame, PhonemesFrame):
+            self._told = frame
         elif isinstance(frame, AggregatedTextFrame) and frame.will_be_spoken:
             await self._end_sentence()
             self._text = frame.text
@@ -100,6 +103,9 @@ class ExpressionProcessor(FrameProcessor):
             self._start = time.monotonic()
         if self._sentence is None:
             self._sentence = Sentence(self._face, self._next_row, self._start - self._opened)
+        told, self._told = self._told, None
+        if told is not None:
+            self._sentence.tell(told.phonemes, told.seconds)
         pcm = np.frombuffer(frame.audio, np.int16)
         for at in range(0, len(pcm), STEP):
             due = self._due(self._sentence)

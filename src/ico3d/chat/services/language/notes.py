@@ -72,6 +72,10 @@ class Notes:
 
     def answer(self, question: str) -> str:
         """The answer to a question in natural language."""
+        return self.known(question) or self.fallback()
+
+    def known(self, question: str) -> str | None:
+        """The answer to a question if the notes, the body or politeness have one."""
         if any(concerns(question, topic) for topic in self._persona.forbidden):
             return self.refusal()
         best, score = self.best(question)
@@ -79,17 +83,20 @@ class Notes:
             return best.answer
         if requested(question, self._gestures) in self._gestures:
             return "Of course."  # the body shows the rest
-        return self._pleasantry(question) or self.fallback()
+        return self._pleasantry(question)
 
     def best(self, question: str) -> tuple[Note | None, float]:
         """The note that matches best, and the score of the match, 0 to 1."""
+        found = self.nearest(question, 1)
+        return found[0] if found else (None, 0.0)
+
+    def nearest(self, question: str, count: int) -> list[tuple[Note, float]]:
+        """The notes that match best, the best first, and their scores, 0 to 1."""
         scored = [
-            (self._likeness(question, asked), note)
+            (note, max(self._likeness(question, asked) for asked in note.questions))
             for note in self.notes
-            for asked in note.questions
         ]
-        score, note = max(scored, key=lambda pair: pair[0], default=(0.0, None))
-        return note, score
+        return sorted(scored, key=lambda pair: -pair[1])[:count]
 
     def fallback(self) -> str:
         """The answer if no note matches."""

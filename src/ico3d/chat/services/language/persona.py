@@ -1,6 +1,8 @@
 """The offline language model: answers are looked up in the persona's notes."""
 
 import re
+from collections.abc import AsyncGenerator
+from contextlib import aclosing
 from dataclasses import dataclass
 
 from pipecat.frames.frames import (
@@ -35,8 +37,9 @@ class PersonaModel(FrameProcessor):
             return
         self._gate.begin_speculation(frame.speculation)
         await self.push_frame(LLMFullResponseStartFrame())
-        for sentence in sentences(self._answer(frame.context)):
-            await self.push_frame(LLMTextFrame(sentence + " "))
+        async with aclosing(self.answers(frame.context)) as said:
+            async for sentence in said:
+                await self.push_frame(LLMTextFrame(sentence + " "))
         await self.push_frame(LLMFullResponseEndFrame())
 
     async def push_frame(self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM):
@@ -44,12 +47,22 @@ class PersonaModel(FrameProcessor):
         for released in self._gate.process(frame, direction):
             await super().push_frame(*released)
 
-    def _answer(self, context: LLMContext) -> str:
-        last = context.get_messages()[-1] if context.get_messages() else None
-        if not isinstance(last, dict) or last.get("role") != "user":
-            return self._notes.not_understood()  # the pipeline asks so when it heard no words
-        content = last.get("content")
-        return self._notes.answer(content if isinstance(content, str) else "")
+    async def answers(self, context: LLMContext) -> AsyncGenerator[str, None]:
+        """Yields the sentences of an answer."""
+        question = question_of(context)
+        heard = question is not None
+        answer = self._notes.answer(question) if heard else self._notes.not_understood()
+        for sentence in sentences(answer):
+            yield sentence
+
+
+def question_of(context: LLMContext) -> str | None:
+    """What the visitor said last; None where the pipeline asks because it heard no words."""
+    last = context.get_messages()[-1] if context.get_messages() else None
+    if not isinstance(last, dict) or last.get("role") != "user":
+        return None
+    content = last.get("content")
+    return content if isinstance(content, str) else ""
 
 
 def sentences(text: str) -> list[str]:

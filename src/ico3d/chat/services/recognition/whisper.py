@@ -17,7 +17,8 @@ from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 AUTO = "auto"
 ON_CUDA = ("large-v3", "large-v3-turbo", "small", "base", "tiny")
 ON_CPU = ("base", "tiny")  # what is larger takes seconds longer than a visitor waits
-ENGLISH = ("distil-large-v3",)  # knows no other language
+DISTILLED, SMALL_ENGLISH = "distil-large-v3", "tiny.en"
+ENGLISH = (DISTILLED, SMALL_ENGLISH)  # know no other language
 NEEDED = ("model.bin", "tokenizer.json")  # what is missing would be downloaded in mid-talk
 _loading = threading.Lock()
 
@@ -127,14 +128,15 @@ def candidates(settings: Settings) -> tuple[str, ...]:
                 f"Whisper '{settings.model}' is unknown, use {names}, or the folder of a model."
             )
         return (settings.model,)
+    english = settings.language == "en"
     if computes_on(settings) != "cuda":
-        return ON_CPU
-    return (*ENGLISH, *ON_CUDA) if settings.language == "en" else ON_CUDA
+        return (*ON_CPU[:-1], SMALL_ENGLISH, *ON_CPU[-1:]) if english else ON_CPU
+    return (DISTILLED, *ON_CUDA) if english else ON_CUDA
 
 
 def weights_name(model: str) -> str:
     """Name of a model in `ico3d weights`."""
-    return model if model in ENGLISH else f"whisper-{model}"
+    return model if model == DISTILLED else f"whisper-{model}"
 
 
 def complete(folder: Path) -> Path:
@@ -173,8 +175,11 @@ def load(folder: Path, device: str, precision: str) -> Any:
     """
     from faster_whisper import WhisperModel
 
+    from ico3d.chat.services.recognition.short_whisper import ShortWhisper
+
+    kind = ShortWhisper if device == "cpu" else WhisperModel  # GPUs do not notice the difference
     try:
-        return WhisperModel(str(folder), device, compute_type=precision, local_files_only=True)
+        return kind(str(folder), device, compute_type=precision, local_files_only=True)
     except (RuntimeError, ValueError) as error:
         raise SettingsError(
             f"Whisper in {folder} cannot be used on {device} with {precision}: {error}."

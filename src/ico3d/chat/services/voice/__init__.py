@@ -1,7 +1,7 @@
 """Voices: text to speech."""
 
 from ico3d.chat.services.provider import Provider, Table
-from ico3d.chat.services.voice import espeak, kokoro, openai, openvoice, piper
+from ico3d.chat.services.voice import espeak, hibari, kokoro, openai, openvoice, piper
 
 PROVIDERS: Table = {
     "openvoice": Provider("OpenVoice V2", openvoice.Settings, openvoice.make, openvoice.hindrance),
@@ -10,6 +10,8 @@ PROVIDERS: Table = {
     "espeak-ng": Provider(
         "espeak-ng", espeak.Settings, espeak.make, espeak.hindrance, stand_in=True
     ),
+    # never the best by itself: it speaks English only
+    "hibari": Provider("Hibari", hibari.Settings, hibari.make, hibari.hindrance),
     # never the best by itself: it may cost money, and takes what is said out of the house
     "openai": Provider("OpenAI-compatible server", openai.Settings, openai.make, openai.hindrance),
 }

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_package
-from ico3d.chat.services.voice.pieces import PieceVoice, at_speech_rate
+from ico3d.chat.services.voice.pieces import PieceVoice, Spoken, at_speech_rate
 from ico3d.common.espeak import synthesize
 
 VARIANT = "+f3"
@@ -76,10 +76,15 @@ def voice_for(text: str, voice: str) -> str:
     return voice if language in languages else languages[0] + plus + variant
 
 
+def speak(text: str, voice: str, rate: int) -> Spoken:
+    """Speaks a text in a voice, or in one for the text's script."""
+    speech = synthesize(text, voice_for(text, voice), rate)
+    return Spoken(at_speech_rate(speech.samples, speech.rate), speech.events)
+
+
 def spoken(text: str, voice: str, rate: int) -> np.ndarray:
     """The sound of a text, (S,) int16 at 24 kHz."""
-    speech = synthesize(text, voice_for(text, voice), rate)
-    return at_speech_rate(speech.samples, speech.rate)
+    return speak(text, voice, rate).pcm
 
 
 def hindrance(settings: Settings) -> str:
@@ -97,4 +102,4 @@ def make(settings: Settings, context: Context) -> PieceVoice:
     languages = context.persona.languages or ("en",)
     voice = settings.voice or voice_of(languages[0]) + VARIANT
     spoken("a", voice, settings.rate)  # fails now rather than in mid-talk
-    return PieceVoice(voice, partial(spoken, voice=voice, rate=settings.rate))
+    return PieceVoice(voice, partial(speak, voice=voice, rate=settings.rate))

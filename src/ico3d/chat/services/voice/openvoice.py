@@ -18,7 +18,7 @@ import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_weights
 from ico3d.chat.services.voice.cloning import Recording, permitted_recording
-from ico3d.chat.services.voice.pieces import LOADING, PieceVoice, at_speech_rate
+from ico3d.chat.services.voice.pieces import LOADING, PieceVoice, Spoken, at_speech_rate
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
 
@@ -106,8 +106,8 @@ class Engine:
                 self._converter = self._load_converter(recording)
             self.speak(LANGUAGES[settings.language][1])
 
-    def speak(self, text: str) -> np.ndarray:
-        """The sound of a text, (S,) int16 at 24 kHz."""
+    def speak(self, text: str) -> Spoken:
+        """Speaks a text."""
         with self._lock:
             samples = self._base.tts_to_file(
                 text, self._speaker_id, None, speed=self._settings.speed, quiet=True
@@ -115,7 +115,7 @@ class Engine:
             rate = self._base.hps.data.sampling_rate
             if self._converter is not None:
                 samples, rate = self._converted(samples, rate)
-        return at_speech_rate(samples, rate)
+        return Spoken(at_speech_rate(samples, rate))
 
     def _load_base(self) -> Any:
         folder = model_of(self._settings.weights)

@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from collections.abc import AsyncGenerator, Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,10 @@ from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.settings import TTSSettings
 from pipecat.services.tts_service import TTSService
 
+from ico3d.chat.frames import PhonemesFrame
 from ico3d.chat.pipecat_internals import mark_synchronous
 from ico3d.chat.wire.protocol import SPEECH_RATE
+from ico3d.common.espeak import Phoneme
 from ico3d.errors import MissingExtraError
 
 STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things
@@ -41,15 +44,28 @@ class Prompt(TTSService):
         mark_synchronous(self)
 
 
+@dataclass(frozen=True)
+class Spoken:
+    """A text that was spoken.
+
+    Attributes:
+        pcm: The sound, (S,) int16 at 24 kHz.
+        phonemes: The speech sounds with their times; empty if the voice does not know them.
+    """
+
+    pcm: np.ndarray
+    phonemes: tuple[Phoneme, ...] = ()
+
+
 class PieceVoice(Prompt):
     """Speaks each piece of an answer by calling a function in a thread."""
 
-    def __init__(self, voice: str, speak: Callable[[str], np.ndarray]):
+    def __init__(self, voice: str, speak: Callable[[str], Spoken]):
         """Creates the voice of one session.
 
         Args:
             voice: Name of the voice.
-            speak: Returns the sound of a text, (S,) int16 at 24 kHz; called from threads.
+            speak: Speaks a text; called from threads.
         """
         super().__init__(
             settings=TTSSettings(model=None, voice=voice, language=None),
@@ -59,13 +75,15 @@ class PieceVoice(Prompt):
         self._speak = speak
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields the sound of a text in one frame, or an error."""
+        """Yields the speech sounds of a text and its sound in one frame, or an error."""
         try:
-            pcm = await asyncio.to_thread(self._speak, text)
+            spoken = await asyncio.to_thread(self._speak, text)
         except Exception as error:
             yield ErrorFrame(f"a sentence could not be spoken: {error}", exception=error)
             return
-        yield TTSAudioRawFrame(pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
+        if spoken.phonemes:
+            yield PhonemesFrame(spoken.phonemes, len(spoken.pcm) / SPEECH_RATE, context_id)
+        yield TTSAudioRawFrame(spoken.pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
 
 
 def at_speech_rate(samples: np.ndarray, rate: int) -> np.ndarray:

@@ -5,8 +5,10 @@ The package piper-tts is licensed under GPL-3.0; it is an optional extra, loaded
 
 import functools
 import json
-from collections.abc import AsyncGenerator
+from collections import deque
+from collections.abc import AsyncGenerator, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +16,12 @@ from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import Frame, TTSAudioRawFrame
 from pipecat.services.tts_service import TTSService
 
+from ico3d.chat.frames import PhonemesFrame
 from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.voice.phonemes import timed
 from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.chat.wire.protocol import SPEECH_RATE
+from ico3d.common.espeak import Phoneme
 from ico3d.common.weights import model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 
@@ -42,9 +47,10 @@ def find_voice(settings: Settings) -> Path:
         MissingModelError: If the voice is not installed.
     """
     names = f"{settings.voice}.onnx", f"{settings.voice}.onnx.json"
-    for folder in model_folders():
-        if all((folder / name).is_file() for name in names):
-            return folder / names[0]
+    places = [place for folder in model_folders() for place in (folder, folder / settings.voice)]
+    for place in places:
+        if all((place / name).is_file() for name in names):
+            return place / names[0]
     fetch = f"python -m piper.download_voices --download-dir {model_folders()[-1]}"
     raise MissingModelError(
         f"the Piper voice '{settings.voice}' is not here: fetch it with {fetch} {settings.voice}."
@@ -79,14 +85,19 @@ def make(settings: Settings, context: Context) -> TTSService:
         def __init__(self, model: Any):
             own = PiperTTSService.Settings(model=None, voice=settings.voice, language=None)
             TTSService.__init__(self, settings=own, **SYNCHRONOUS, **OPTIONS)
-            self._voice = model
+            self._voice = self._model = model
             # its own forgets the sound before a pause of 0.2 s, which a slow machine makes
             self._resampler = create_stream_resampler(clear_after_secs=None)
 
         async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
-            """Yields the sound, and what its resampler would keep for the next piece: 20 ms."""
+            """Yields speech sounds and sound, also the 20 ms that a resampler would keep."""
             await self._resampler.reset()  # the piece before may have been interrupted
+            telling: Any = Telling(self._model)  # one each: a piece before may still be on its way
+            self._voice = telling
             async for frame in super().run_tts(text, context_id):
+                while telling.told:
+                    phonemes, seconds = telling.told.popleft()
+                    yield PhonemesFrame(phonemes, seconds, context_id)
                 yield frame
             if rest := await self._resampler.flush():
                 yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
@@ -109,4 +120,28 @@ def engine(model: Path, cuda: bool) -> Any:
             f"{model}: Piper's Chinese voices would download a dictionary in mid-talk: "
             "use kokoro or openvoice."
         )
-    return PiperVoice.load(model, use_cuda=cuda)
+    aligned = find_spec("onnx") is not None  # with which Piper finds the durations in its model
+    return PiperVoice.load(model, use_cuda=cuda, include_alignments=aligned)
+
+
+class Telling:
+    """A Piper voice that keeps the speech sounds of what it speaks.
+
+    Attributes:
+        config: The voice's own configuration.
+        told: Speech sounds and seconds of each sentence that nobody has taken yet.
+    """
+
+    def __init__(self, voice: Any):
+        """Wraps a `piper.PiperVoice`."""
+        self._voice, self.config = voice, voice.config
+        self.told: deque[tuple[tuple[Phoneme, ...], float]] = deque()
+
+    def synthesize(self, text: str) -> Iterator[Any]:
+        """Yields Piper's sentences."""
+        for sentence in self._voice.synthesize(text, include_alignments=True):
+            rate = sentence.sample_rate
+            lengths = sentence.phoneme_alignments or ()
+            if phonemes := timed((a.phoneme, float(a.num_samples) / rate) for a in lengths):
+                self.told.append((phonemes, len(sentence.audio_float_array) / rate))
+            yield sentence

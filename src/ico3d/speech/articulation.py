@@ -1,4 +1,7 @@
-"""Training targets of the built-in encoder: mouth shapes and lip articulation over time."""
+"""Mouth shapes and lip articulation over time, from phonemes.
+
+The built-in encoder learns to tell them, and voices that know their phonemes drive lips by them.
+"""
 
 from collections.abc import Sequence
 

@@ -2,7 +2,7 @@ import numpy as np
 
 from ico3d.common.espeak import Phoneme
 from ico3d.common.visemes import VISEMES
-from ico3d.speech.training.targets import ARTICULATION, articulation_track, viseme_track
+from ico3d.speech.articulation import ARTICULATION, articulation_track, viseme_track
 
 WORD = (
     Phoneme(0.2, "p"),

@@ -1,0 +1,1 @@
+"""The natural conversation: neural services in packages that everyone can reach."""
