@@ -241,7 +241,7 @@ def resampled(sound: np.ndarray, rate: int) -> np.ndarray:
 def test_the_demos_lips_open_when_the_sounds_do(tmp_path):
     from ico3d.common.espeak import synthesize
     from ico3d.measure.lips import lip_lag_ms
-    from ico3d.speech.training.targets import articulation_track
+    from ico3d.speech.articulation import articulation_track
 
     text = "My father packed papa's map. A bobcat may pop out."
     voice = synthesize(text, "en-us", rate=150)

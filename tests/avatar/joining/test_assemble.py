@@ -19,13 +19,10 @@ from ico3d.avatar.joining.similarity import moved
 from ico3d.body.companion import Pruning
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.capture.capture import Capture
-from ico3d.capture.face.region import HeadRegion
-from ico3d.errors import CaptureError, ModelError, SettingsError
-from ico3d.head.model import HeadModel
+from ico3d.errors import CaptureError, SettingsError
 from ico3d.measure.body import evaluate_body
-from support.avatars.planted_person import ABROAD, FRAMES, NAMES, PlantedPerson, face, planted_head
+from support.avatars.planted_person import ABROAD, FRAMES, PlantedPerson, face, planted_head
 from support.avatars.tiny_joining import STEPS_PER_FRAME, assembly_of
-from support.heads.shapes import head_shape
 
 pytestmark = pytest.mark.slow
 
@@ -194,21 +191,12 @@ def test_what_is_missing_is_said(person, head, tmp_path):
     person.landmarks = lambda camera, frame: None
     with pytest.raises(CaptureError, match="no landmarks of the face: find them with ico3d capt"):
         align(person, face(), print)
-    (tmp_path / "head").mkdir()
-    person.landmarks_3d = lambda frame: face()
-    plain = HeadModel(head_shape(len(NAMES), "no-mlp"), 40)
-    region = HeadRegion.around(face())
-    plain.means.data = torch.from_numpy(region.spheres[0, :3] + 0 * face()[:40]).float()
-    replace(head, model=plain).save(tmp_path / "head")
-    with pytest.raises(ModelError, match=r"no network .* assemble with --joining.no-match-colors"):
-        assemble(person, tmp_path / "b", assembly_of(tmp_path / "head"), print)
 
 
-@pytest.mark.parametrize("change", [{"color_steps": 0}, {"color_rate": 0.0}, {"border_points": -1}])
-def test_impossible_settings_are_refused(change):
+def test_impossible_settings_are_refused():
     """When they are given."""
-    with pytest.raises(SettingsError, match="are impossible"):
-        JoiningSettings(**change)
+    with pytest.raises(SettingsError, match="border_points=-1 is impossible"):
+        JoiningSettings(border_points=-1)
 
 
 def test_the_command_sorts_its_settings(tmp_path, capsys):
@@ -221,11 +209,11 @@ def test_the_command_sorts_its_settings(tmp_path, capsys):
     on = cli.parsed("assemble", [*places, "--body", str(tmp_path / "body")]).assembly()
     assert (on.body.steps, on.body.warmup_steps) == (10_000, 0)
     assert on.about(tmp_path)["continued"] == str(tmp_path / "body")
-    assert cli.main(["assemble", *places, "--joining.color-steps", "0"]) == 1
-    assert "color_steps=0" in capsys.readouterr().err
+    assert cli.main(["assemble", *places, "--joining.border-points", "-1"]) == 1
+    assert "border_points=-1" in capsys.readouterr().err
     with pytest.raises(SystemExit):
-        cli.main(["assemble", *places, "--joining.colour-steps", "3"])
-    assert "--joining.color-steps" in capsys.readouterr().err
+        cli.main(["assemble", *places, "--joining.border-point", "3"])
+    assert "--joining.border-points" in capsys.readouterr().err
 
 
 def test_a_planted_capture_is_a_capture(abroad):

@@ -13,11 +13,11 @@ from ico3d.avatar.joining.checking import write_checks
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.finding.drawn_head import DrawnHead
 from ico3d.avatar.joining.finding.found_placement import OverRecording, head_poses
-from ico3d.avatar.joining.recolour import color_difference, recolour
+from ico3d.avatar.joining.relight import color_difference, relit
 from ico3d.avatar.joining.seam import seam_scores
 from ico3d.capture.face.region import HeadRegion
 from support.avatars.planted_person import FRAMES, PlantedPerson, face, planted_head
-from support.avatars.tiny_joining import RECOLOUR, assembly_of, parts_of
+from support.avatars.tiny_joining import assembly_of, parts_of
 from support.pretended_cuda import drawn, is_on_cuda
 from support.settings import changed
 
@@ -29,11 +29,10 @@ def test_colours_are_matched(cuda, head, abroad):
     placement, expressions, views, tested = parts_of(abroad, head)
     other = copy.deepcopy(head.model).requires_grad_(False).to(cuda)
     head.model.requires_grad_(False)
-    quick = replace(RECOLOUR, steps=20)
-    recolour(head.model, placement, expressions, views, quick)
-    recolour(other, placement, expressions, views, quick)
-    assert is_on_cuda(other.color_branch.weight)
-    here = color_difference(head.model, placement, expressions, tested)
+    relight = relit(head.model, face(), placement, expressions, views)
+    other = relit(other, face(), placement, expressions, views)
+    assert is_on_cuda(other.light)
+    here = color_difference(relight, placement, expressions, tested)
     there = color_difference(other, placement, expressions, tested)
     assert there == pytest.approx(here, rel=0.02)
 
@@ -43,7 +42,7 @@ def test_an_avatar_is_assembled_and_measured(cuda, tmp_path, monkeypatch):
     capture, said = PlantedPerson.elsewhere(tmp_path / "capture"), []
     (tmp_path / "head").mkdir()
     planted_head().save(tmp_path / "head")
-    assembly = assembly_of(tmp_path / "head", color_steps=10)
+    assembly = assembly_of(tmp_path / "head")
     small = changed(assembly.body, {"steps_per_frame": 2, "warmup_steps": 2, "checkpoint_every": 9})
     assembly = replace(assembly, body=small, device="cuda")
     with drawn(monkeypatch) as pictures:

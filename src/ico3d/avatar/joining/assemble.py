@@ -21,7 +21,7 @@ from ico3d.avatar.joining.cropping import cropped, near_border
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.finding.found_placement import found_in_pictures
-from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
+from ico3d.avatar.joining.relight import color_difference, relit
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words, moved
@@ -285,17 +285,11 @@ def _match_colors(
     assembly: Assembly,
     say: Say,
 ) -> None:
-    if not head.model.shape.has_mlp:
-        raise ModelError(
-            f"{assembly.head}: this variant of head has no network whose colours could be matched: "
-            "train one with --variant full, or assemble with --joining.no-match-colors."
-        )
-    joining, landmarks = assembly.joining, _landmarks(head, assembly.head)
+    landmarks = _landmarks(head, assembly.head)
     recording, capture = capture, training_part(capture, assembly.hold_out)
     views = face_views(capture, placement, HeadRegion.around(landmarks), landmarks)
     before = color_difference(head.model, placement, expressions, views)
-    settings = RecolourSettings(joining.color_steps, joining.color_rate, assembly.seed)
-    recolour(head.model, placement, expressions, views, settings)
+    head.model = relit(head.model, landmarks, placement, expressions, views)
     after = color_difference(head.model, placement, expressions, views)
     taught = trained_on(recording, train_cameras(capture), range(capture.num_frames))
     head.summary = head.summary | {"recoloured": taught}

@@ -29,7 +29,8 @@ def _selected(model: HeadModel, keep: torch.Tensor) -> HeadModel:
     """A copy of the model with the Gaussians of some indices (K,)."""
     chosen = HeadModel(model.shape, len(keep))
     values = dict(model.state_dict())
-    for name, axis in GAUSSIAN_AXES.items():
+    axes = GAUSSIAN_AXES | ({"light": 0} if model.shape.relit else {})
+    for name, axis in axes.items():
         values[name] = values[name].index_select(axis, keep.to(values[name].device))
     chosen.load_state_dict(values)
     return chosen
