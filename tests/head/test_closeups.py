@@ -5,10 +5,19 @@ import pytest
 import torch
 
 from ico3d.head.closeups import CloseUp, CloseUps
-from ico3d.head.expressions import FASTEST, USUAL, BlendshapeTrack, evening_rates
+from ico3d.head.expressions import (
+    FASTEST,
+    USUAL,
+    BlendshapeTrack,
+    SpeechTrack,
+    evening_rates,
+    is_of_eyes,
+)
+from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, trainer_of
 from ico3d.head.views import View, view_of
+from ico3d.speech.network import SpeechAdaptor
 from support.heads.tiny_capture import SIZE, TinyCapture
 from support.settings import changed
 
@@ -96,3 +105,52 @@ def test_small_blendshapes_learn_faster_and_unused_ones_as_usual(tmp_path):
     capture._weights[:] = [0.6, 0.001, 0.0]
     track = BlendshapeTrack(capture, ("redden", "pale", "unused"))
     assert evening_rates(track, range(5)).tolist() == pytest.approx([USUAL / 0.6, FASTEST, 1.0])
+
+
+def test_gaussians_begin_in_the_order_of_their_distance_from_the_mouth(tmp_path):
+    capture, rng = Mouthed(tmp_path), np.random.default_rng(0)
+    settings = changed(PRESETS["cpu"], {"initial.gaussians": 60})
+    means = initial_head(capture, settings, "full", 3, rng).means.detach()
+    mouth = torch.from_numpy(capture.landmarks_3d(0)[48:].mean(0)).float()
+    away = (means - mouth).norm(dim=1)
+    assert len(away) == 60 and (away.diff() >= -1e-6).all()
+
+
+class Browed(Mouthed):
+    """A capture whose last blendshape moves a brow."""
+
+    blendshape_names = ("redden", "pale", "browInnerUp")
+
+    def __init__(self, path):
+        super().__init__(path)
+        self._weights[:] = [0.5, 0.2, 0.7]
+
+
+def test_the_rows_of_eyes_and_brows_are_known_by_name_and_in_speech_by_place(tmp_path):
+    capture = Browed(tmp_path)
+    named = BlendshapeTrack(capture, ("redden", "browInnerUp", "pale"))
+    assert is_of_eyes(named).tolist() == [False, True, False]
+    spoken = SpeechTrack(capture, np.zeros((40, 64), np.float32), SpeechAdaptor(64))
+    assert is_of_eyes(spoken).nonzero()[:, 0].tolist() == list(range(32, 39))
+
+
+def test_gaussians_at_the_mouth_learn_nothing_from_eyes_and_brows(tmp_path):
+    capture = Browed(tmp_path)
+    settings = changed(PRESETS["cpu"], {"close_ups": 2, "initial.gaussians": 200})
+    trainer, _ = trainer_of(capture, HeadJob("blendshapes", "full", "builtin", 0, settings), "cpu")
+    mouth = torch.tensor([0, -0.05, 0.2])
+    at_mouth = (trainer.model.means.detach() - mouth).norm(dim=1) < 0.75 * WIDTH  # (N,)
+    trainer.step(0)
+    learnt = (trainer.model.basis != 0).any(2)  # (R, N)
+    assert 0 < at_mouth.sum() < len(at_mouth)
+    assert not learnt[2, at_mouth].any()
+    assert learnt[:2, at_mouth].any(1).all() and learnt[:3, ~at_mouth].any(1).all()
+
+
+def test_without_close_ups_all_gaussians_learn_from_all_rows(tmp_path):
+    settings = changed(PRESETS["cpu"], {"close_ups": 0, "initial.gaussians": 200})
+    job = HeadJob("blendshapes", "full", "builtin", 0, settings)
+    trainer, _ = trainer_of(Browed(tmp_path), job, "cpu")
+    trainer.step(0)
+    learnt = (trainer.model.basis != 0).any(2)  # (R, N)
+    assert torch.equal(learnt[2], learnt[0])

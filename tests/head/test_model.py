@@ -138,3 +138,19 @@ def test_a_file_of_something_else_is_one_sentence(tmp_path):
     save_tensors(tmp_path / "x.safetensors", {"a": torch.zeros(1)}, {"shape": {"nonsense": 1}})
     with pytest.raises(ModelError, match="does not hold a head model"):
         HeadModel.load(tmp_path / "x.safetensors")
+
+
+def test_harmonics_follow_a_change_of_light():
+    """As small changes of colour do: by the derivative of new colours by old ones."""
+    model = HeadModel(head_shape(2, features=4, hidden=3, frequencies=1, sh_degree=1), 3).double()
+    for value in model.parameters():
+        value.data = 0.3 * torch.randn_like(value)
+    change = torch.linspace(-1, 1, 9, dtype=torch.float64).reshape(3, 3)
+    expression = torch.tensor([0.2, -0.5], dtype=torch.float64)
+    before, after = model.logits(expression), model.relit(change).double().logits(expression)
+    colors, tiny = before[:, :3].sigmoid(), 1e-6
+    nudged = ((colors + tiny).logit() + change).sigmoid()
+    slope = (nudged - (colors.logit() + change).sigmoid()) / tiny  # (N, 3)
+    expected = before[:, 4:] * slope.repeat(1, 3)
+    torch.testing.assert_close(after[:, 4:], expected, rtol=1e-4, atol=1e-6)
+    torch.testing.assert_close(after[:, 3], before[:, 3], rtol=1e-6, atol=1e-6)

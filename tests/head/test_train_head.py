@@ -11,7 +11,7 @@ from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import PRESETS
-from ico3d.head.train_head import HeadJob, train_head
+from ico3d.head.train_head import HeadJob, train_head, trainer_of
 from ico3d.splat.render import render
 from ico3d.training.checkpoint import load_tensors
 from ico3d.training.finite import check_finite
@@ -165,6 +165,24 @@ def test_the_adaptor_learns(tiny, tmp_path):
     fresh = SpeechAdaptor(64).state_dict()
     trained = head.adaptor.state_dict()
     assert any(not torch.equal(fresh[name], trained[name]) for name in fresh)
+
+
+def test_a_head_begins_with_the_lips_that_its_recording_tells(tiny, monkeypatch):
+    def landmarks(self, frame):  # a jaw that opens as loud as the sound is
+        loud = np.abs(self.audio().samples[round(frame * 16000 / self.fps) :][:320]).mean()
+        return np.full((68, 3), loud)
+
+    general = trainer_of(tiny, _job("speech"), "cpu")[0].adaptor.lips  # told by the encoder
+    assert general[0].any() and not general[5:].any()
+    monkeypatch.setattr(type(tiny), "landmarks_3d", landmarks)
+    trainer, _ = trainer_of(tiny, _job("speech"), "cpu")
+    reading = trainer.adaptor.lips.clone()
+    assert reading[0].any() and not reading[1:].any()  # all landmarks move alike: one value
+    spoken = torch.stack([trainer.track.at(frame).detach() for frame in tiny.split.train])
+    heard = np.array([landmarks(tiny, frame)[0, 0] for frame in tiny.split.train])
+    assert abs(np.corrcoef(spoken[:, 0].numpy(), heard)[0, 1]) > 0.8
+    trainer.step(0)
+    torch.testing.assert_close(trainer.adaptor.lips, reading)
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ from ico3d.cli import main
 from ico3d.errors import SettingsError
 from ico3d.measure import expression as room
 from ico3d.measure.alignment import aligned, transcripts
+from ico3d.speech.articulation import ARTICULATION, articulation_track
 from ico3d.speech.training.corpus import utterance
-from ico3d.speech.training.targets import ARTICULATION, articulation_track
 from support.shared import SPEECH
 
 pytestmark = pytest.mark.slow

@@ -125,6 +125,16 @@ def test_nothing_to_draw_leaves_the_background(cameras, device):
 
 
 @pytest.mark.parametrize("device", DEVICES)
+def test_a_background_learns_as_much_as_it_shows(cameras, device):
+    gaussians = reference.scene(20, dtype=torch.float32).to(device)
+    behind = torch.rand(3, device=device, requires_grad=True)
+    picture = render(gaussians, cameras, behind)
+    picture.rgb.sum().backward()
+    shown = (1 - picture.alpha).sum()
+    torch.testing.assert_close(behind.grad, shown.expand(3), rtol=1e-5, atol=0)
+
+
+@pytest.mark.parametrize("device", DEVICES)
 def test_what_lies_behind_is_not_drawn_and_gets_no_gradient(device):
     camera = camera_at((0, 0, 1.0))
     gaussians = reference.scene(20, dtype=torch.float32)

@@ -13,7 +13,7 @@ _NODE, _INITIALIZER, _SPARSE, _INPUT, _OUTPUT = 1, 5, 15, 11, 12
 _OP_TYPE, _ATTRIBUTE, _DOMAIN = 4, 5, 7
 _TENSOR, _SUBGRAPHS = 5, (6, 11)
 _EXTERNAL, _LOCATION = 13, 14
-_NAME = 1
+_NAME, _TENSOR_NAME = 1, 8
 OPERATORS = {
     "Add",
     "Cast",
@@ -42,13 +42,18 @@ There are no loops and no random numbers among them.
 Value = int | memoryview
 
 
+OPTIONAL_INPUT = "told"
+"""Input that a model may have besides its own, with a value for when it is not given."""
+
+
 def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> None:
     """Checks that a model is self-contained and has the expected input and output.
 
     Args:
         data: Content of the file.
         name: Name of the file, for errors.
-        input_name: Expected name of the graph's only input.
+        input_name: Expected name of the graph's only input; `OPTIONAL_INPUT` may follow it, if
+            the model has a weight of the same name.
         output_name: Expected name of the graph's only output.
 
     Raises:
@@ -71,15 +76,19 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
 
 def _check_graph(graph: memoryview, name: str, input_name: str, output_name: str) -> None:
     names: dict[int, list[str]] = {_INPUT: [], _OUTPUT: []}
+    weights = set()
     for field, value in _fields(graph):
         if field == _NODE:
             _check_node(_bytes(value), name)
         elif field == _INITIALIZER:
             _check_tensor(_bytes(value), name)
+            weights.add(_text(_bytes(value), _TENSOR_NAME))
         elif field == _SPARSE:
             raise BundleError(f"{name}: has sparse weights.")
         elif field in names:
             names[field].append(_text(_bytes(value), _NAME))
+    if OPTIONAL_INPUT in weights and names[_INPUT][1:] == [OPTIONAL_INPUT]:
+        del names[_INPUT][1]
     if names != {_INPUT: [input_name], _OUTPUT: [output_name]}:
         raise BundleError(f"{name}: must lead from '{input_name}' to '{output_name}'.")
 

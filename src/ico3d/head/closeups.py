@@ -99,6 +99,14 @@ class CloseUps:
         box = Box(*low.tolist(), *(high - low).tolist())
         return CloseUp(view, box, (depth - DEPTH * width, depth + DEPTH * width))
 
+    def at_mouth(self, means: Tensor) -> Tensor:
+        """(N,) bool: which Gaussians (N, 3) lie about the mouth, on the CPU; none without it."""
+        if self._mouth is None:
+            return torch.zeros(len(means), dtype=torch.bool)
+        reach = REACH * float(np.ptp(self._mouth[:, 0]))
+        middle = torch.from_numpy(self._mouth.mean(0)).to(means.dtype)
+        return (means.detach().cpu() - middle).norm(dim=1) < reach
+
     def _shows_mouth(self, view: View) -> bool:
         if squareness(view.camera) <= SHOWS_MOUTH:
             return False

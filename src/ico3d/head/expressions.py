@@ -1,7 +1,7 @@
 """The expression of each frame of a capture, and how the head is turned."""
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -103,6 +103,16 @@ def evening_rates(track: ExpressionTrack, frames: Iterable[int]) -> Tensor:
     return torch.where(sizes > 0, factors, 1.0)
 
 
+def is_of_eyes(track: ExpressionTrack) -> Tensor:
+    """(B,) which values of an expression move eyes or brows, and nothing at the mouth."""
+    if isinstance(track, BlendshapeTrack):
+        return torch.tensor([name.startswith(("eye", "brow")) for name in track.names])
+    eyes = torch.zeros(track.size, dtype=torch.bool)
+    if isinstance(track, SpeechTrack):
+        eyes[-len(EYE_NAMES) :] = True
+    return eyes
+
+
 class SpeechTrack:
     """Expressions of 32 adapted speech features and 7 eye values, B = 39.
 
@@ -199,7 +209,7 @@ class TurnRange:
     most: tuple[float, ...]
 
     def values(self, rotation: np.ndarray) -> np.ndarray:
-        """(3,) float32 values of a head's rotation (3, 3) in the world; 0 at the mean rotation.
+        """(..., 3) float32 values of rotations (..., 3, 3) in the world; 0 at the mean rotation.
 
         A head model is undefined outside of what it was trained with. So angles beyond the largest
         seen count as the largest.
@@ -221,7 +231,7 @@ def turn_of(capture: Capture, frames: Iterable[int]) -> TurnRange:
     )
 
 
-def turned(expression: Tensor, turn: TurnRange, capture: Capture, frame: int) -> Tensor:
-    """An expression (B,) followed by the values (3,) of the head's rotation in a frame."""
-    values = turn.values(head_pose(capture, frame)[:3, :3])  # (3,)
-    return torch.cat([expression, torch.from_numpy(values)])
+def turn_values(turn: TurnRange, capture: Capture, frames: Sequence[int]) -> Tensor:
+    """The values (T, 3) of the head's rotation in T frames, which follow the expressions'."""
+    poses = np.stack([head_pose(capture, frame)[:3, :3] for frame in frames])  # (T, 3, 3)
+    return torch.from_numpy(turn.values(poses))

@@ -7,6 +7,8 @@ import numpy as np
 import torch
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.region import MOUTH
 from ico3d.capture.surface.coverage import Moment, find_gap
 from ico3d.capture.surface.head import head_silhouettes
 from ico3d.common.camera import Camera
@@ -59,6 +61,8 @@ def initial_head(
     if surface is None or len(surface) < LEAST_POINTS or not np.isfinite(surface).all():
         raise CaptureError(f"{capture.path} has no finite surface points to start from.")
     points = _whole_person(capture, surface, settings.initial.gaussians, rng)  # (N, 3)
+    if settings.close_ups:
+        points = _mouth_first(capture, points)
     widths = spacing(points)  # (N,)
     low, high = points.min(0), points.max(0)
     shape = HeadShape(
@@ -76,6 +80,19 @@ def initial_head(
     model.means.data = torch.from_numpy(points).float()
     model.log_scales.data = torch.from_numpy(np.log(widths)).float()[:, None].repeat(1, 3)
     return model
+
+
+def _mouth_first(capture: Capture, points: np.ndarray) -> np.ndarray:
+    """The points (N, 3) by their distance from the mouth, where landmarks tell its place.
+
+    What a close-up shows then lies side by side in the basis, which is read three times as fast as
+    if it were scattered.
+    """
+    landmarks = canonical_landmarks(capture)
+    if landmarks is None:
+        return points
+    away = np.linalg.norm(points - landmarks[MOUTH].mean(0), axis=1)  # (N,)
+    return points[np.argsort(away, kind="stable")]
 
 
 def _whole_person(

@@ -69,7 +69,7 @@ class HeadLoss:
         image = rendering.rgb  # (1, H, W, 3)
         if weights.torso != 1 and picture.torso is not None:
             ignored = ((1 - weights.torso) * picture.torso)[..., None]  # (H, W, 1)
-            image = image + ignored * (target - image)
+            image = torch.lerp(image, target, ignored)  # (1, H, W, 3)
         loss = photometric(
             image,
             target[None],

@@ -2,15 +2,16 @@
 
 import json
 import math
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor, nn
 
 from ico3d.common.expression import TURN_SIZE
 from ico3d.errors import ModelError
+from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
@@ -21,7 +22,7 @@ Variant = Literal["full", "no-mlp", "no-blending", "static"]
 INITIAL_OPACITY = 0.1
 
 GAUSSIAN_AXES = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
-"""The parameters that exist per Gaussian, with the axis along which the Gaussians lie."""
+"""What is learnt per Gaussian, with the axis along which the Gaussians lie."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class HeadShape:
             view; 0 for colours that do not.
         turns: Whether the basis has rows for the head's rotation, too, by which its shading
             follows lamps that stand still (`TurnRange`).
+        relit: Whether each Gaussian has a change of light (`HeadModel.relit`).
     """
 
     expression_size: int
@@ -55,6 +57,7 @@ class HeadShape:
     box_size: float = 1.0
     sh_degree: int = 0
     turns: bool = False
+    relit: bool = False
 
     @property
     def outputs(self) -> int:
@@ -105,6 +108,8 @@ class HeadModel(nn.Module):
         log_scales: (N, 3) log of metres.
         basis: (R, N, w) latent basis F: rows of the expression, of the head's rotation, if it
             counts, and of the bias f_0.
+        light: (N, 3) what is added to the logits of red, green and blue in every expression; only
+            where the shape is `relit`.
     """
 
     def __init__(self, shape: HeadShape, num_gaussians: int):
@@ -116,6 +121,8 @@ class HeadModel(nn.Module):
         self.quats = nn.Parameter(torch.tensor([1.0, 0, 0, 0]).repeat(count, 1))
         self.log_scales = nn.Parameter(torch.full((count, 3), -5.0))
         self.basis = nn.Parameter(torch.zeros(shape.rows, count, shape.width))
+        if shape.relit:
+            self.light = nn.Parameter(torch.zeros(count, 3))
         bias = math.log(INITIAL_OPACITY / (1 - INITIAL_OPACITY))
         if shape.has_mlp:
             self.trunk = nn.Linear(shape.mlp_inputs, shape.hidden)
@@ -163,7 +170,8 @@ class HeadModel(nn.Module):
         """(N, V) values of the Gaussians; arguments as for `forward`."""
         if features is None:
             features = self.blended(expression)
-        return self.decode(features, expression)
+        values = self.decode(features, expression)
+        return _in_light(values, self.light) if self.shape.relit else values
 
     def blended(self, expression: Tensor) -> Tensor:
         """(N, w) blended features f for an expression (B,)."""
@@ -181,15 +189,27 @@ class HeadModel(nn.Module):
         """The MLP φ: features (N, w) and expression (B,) to values (N, V)."""
         if not self.shape.has_mlp:
             return features
-        return self.branches(self.hidden(features, expression))
+        if not self.shape.blends or not decoder.has_kernel(features, self.means):
+            return self.branches(self.hidden(features, expression))
+        return decoder.decode(
+            features,
+            self._positions(),
+            self.shape.frequencies,
+            (self.trunk.weight, self.trunk.bias),
+            self._last_layer(),
+        )
 
     def branches(self, hidden: Tensor) -> Tensor:
         """The last layer of φ: activations (N, hidden) to values (N, V)."""
+        return nn.functional.linear(hidden, *self._last_layer())
+
+    def _last_layer(self) -> tuple[Tensor, Tensor]:
+        """Weight (V, hidden) and bias (V,) of the last layer of φ."""
         layers = [self.color_branch, self.opacity_branch]
         if self.shape.sh_degree:
             layers.append(self.harmonics_branch)
-        weight = torch.cat([layer.weight for layer in layers])  # (V, hidden)
-        return nn.functional.linear(hidden, weight, torch.cat([layer.bias for layer in layers]))
+        weight = torch.cat([layer.weight for layer in layers])
+        return weight, torch.cat([layer.bias for layer in layers])
 
     def hidden(self, features: Tensor, expression: Tensor) -> Tensor:
         """Input (N, hidden) of the last layer of φ; arguments as for `decode`."""
@@ -200,10 +220,15 @@ class HeadModel(nn.Module):
 
     def encoded_positions(self) -> tuple[Tensor, Tensor]:
         """γ(μ) in two parts: positions in the head's box (N, 3), sines and cosines (N, 6·L)."""
+        positions = self._positions()
+        rates = decoder.octave_rates(self.shape.frequencies).to(positions)  # (L,)
+        angles = (positions[:, None] * rates[:, None]).flatten(1)  # (N, 3·L)
+        return positions, torch.cat([angles.sin(), angles.cos()], 1)
+
+    def _positions(self) -> Tensor:
+        """Positions (N, 3) in the head's box, about −1 … 1."""
         center = self.means.new_tensor(self.shape.box_center)
-        positions = (self.means - center) / self.shape.box_size  # (N, 3), about −1 … 1
-        waves: Tensor = _Waves.apply(positions, self.shape.frequencies)  # type: ignore[assignment]
-        return positions, waves
+        return (self.means - center) / self.shape.box_size
 
     def gaussians(self, logits: Tensor) -> Gaussians:
         """Renderable Gaussians with the given values (N, V)."""
@@ -219,6 +244,20 @@ class HeadModel(nn.Module):
             colors=colors if sh is None else None,
             sh=sh,
         )
+
+    def relit(self, change: Tensor) -> "HeadModel":
+        """A copy in another light.
+
+        Args:
+            change: (N, 3) what the other light adds to the logits of red, green and blue, whatever
+                the expression. Added to a logit, it multiplies c / (1 − c) of a colour c: a gain
+                of light that runs into black and white as softly as on film.
+        """
+        model = HeadModel(replace(self.shape, relit=True), len(self)).to(self.device)
+        values = dict(self.state_dict())
+        values["light"] = values.get("light", 0) + change.to(self.means)  # (N, 3)
+        model.load_state_dict(values)
+        return model.requires_grad_(self.means.requires_grad)
 
     def save(self, path: Path) -> None:
         """Writes shape and parameters to one safetensors file."""
@@ -244,28 +283,14 @@ class HeadModel(nn.Module):
         return model
 
 
-class _Waves(torch.autograd.Function):
-    """Sines and cosines (N, 6·L) of positions (N, 3) in L octaves.
+def _in_light(values: Tensor, light: Tensor) -> Tensor:
+    """Values (N, V) of Gaussians with (N, 3) added to the logits of their colours.
 
-    Each is the derivative of the other but for sign and frequency, so the backward pass needs no
-    second look at the angles.
+    Harmonics are small changes of a colour, so they change as the colour's derivative does.
     """
-
-    @staticmethod
-    def forward(ctx: Any, positions: Tensor, octaves: int) -> Tensor:
-        rates = math.pi * 2.0 ** torch.arange(octaves).to(positions)  # (L,)
-        angles = (positions[:, None] * rates[:, None]).flatten(1)  # (N, 3·L)
-        waves = angles.new_empty(len(angles), 2 * angles.shape[1])  # (N, 6·L)
-        sines, cosines = waves.chunk(2, 1)
-        torch.sin(angles, out=sines)
-        torch.cos(angles, out=cosines)
-        ctx.save_for_backward(waves, rates)
-        return waves
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
-        waves, rates = ctx.saved_tensors
-        sines, cosines = waves.chunk(2, 1)  # (N, 3·L) each
-        by_sine, by_cosine = gradients[0].chunk(2, 1)
-        by_angle = by_sine * cosines - by_cosine * sines  # (N, 3·L)
-        return torch.einsum("nlx,l->nx", by_angle.unflatten(1, (-1, 3)), rates), None
+    logits = values[:, :3] + light  # (N, 3)
+    if values.shape[1] == 4:
+        return torch.cat([logits, values[:, 3:]], 1)  # (N, 4)
+    before, after = (x.sigmoid() * (-x).sigmoid() for x in (values[:, :3], logits))  # (N, 3) each
+    rest = values[:, 4:].unflatten(1, (-1, 3)) * (after / before.clamp_min(1e-6))[:, None]
+    return torch.cat([logits, values[:, 3:4], rest.flatten(1)], 1)  # (N, V)

@@ -215,7 +215,7 @@ def _load_adaptor(path: Path) -> SpeechAdaptor:
     tensors, state = load_tensors(path)
     try:
         adaptor = SpeechAdaptor(int(state["features"]), int(state.get("vectors", 1)))
-        adaptor.load_state_dict(tensors)
+        adaptor.restore(tensors)
     except (KeyError, RuntimeError) as error:
         raise ModelError(f"{path} does not hold a speech adaptor ({error}).") from error
     return adaptor

@@ -13,7 +13,13 @@ from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.blending.basis import blend_of, update_basis
 from ico3d.head.closeups import CloseUp, CloseUps
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
-from ico3d.head.expressions import ExpressionTrack, evening_rates, turn_of, turned
+from ico3d.head.expressions import (
+    ExpressionTrack,
+    evening_rates,
+    is_of_eyes,
+    turn_of,
+    turn_values,
+)
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import SGD_GAINS, HeadSettings
@@ -84,7 +90,9 @@ class HeadTrainer:
         self.poses = poses_digest(capture)
         frames = sorted({view.frame for view in self.views})
         self.turn = turn_of(capture, frames) if model.shape.turns else None
+        self._turns = self._turn_values(frames)
         self._evening = self._row_factors(frames).to(model.device)  # (R,)
+        self._eyes = self._eye_rows()  # (R,)
         self._close_ups = CloseUps(capture, self.views if settings.close_ups else [], seed)
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
@@ -140,7 +148,7 @@ class HeadTrainer:
         """The expression (B,) of a view's frame and how the head is turned, on its device."""
         expression = self.track.at(view.frame)
         if self.turn is not None:
-            expression = turned(expression, self.turn, self._capture, view.frame)  # (B + 3,)
+            expression = torch.cat([expression, self._turns[view.frame]])  # (B + 3,)
         return expression.to(self.model.device)
 
     def __len__(self) -> int:
@@ -184,7 +192,7 @@ class HeadTrainer:
         self.model.resize(tensors["model.means"].shape[0])
         self.model.load_state_dict(_below("model.", tensors))
         if self.adaptor is not None:
-            self.adaptor.load_state_dict(_below("adaptor.", tensors))
+            self.adaptor.restore(_below("adaptor.", tensors))
         self._optimiser.moments = _below("moments.", tensors)
         self._density.restore(_below("density.", tensors))
 
@@ -263,6 +271,13 @@ class HeadTrainer:
             rates = {name: rate * SGD_GAINS[name] for name, rate in rates.items()}
         return rates
 
+    def _turn_values(self, frames: Sequence[int]) -> dict[int, Tensor]:
+        """The values (3,) of the head's rotation by frame; one by one they cost a step 0.5 ms."""
+        if self.turn is None:
+            return {}
+        values = turn_values(self.turn, self._capture, frames)  # (T, 3)
+        return dict(zip(frames, values, strict=True))
+
     def _row_factors(self, frames: Sequence[int]) -> Tensor:
         """(R,) factors of the rows' learning rates."""
         factors = torch.ones(self.model.shape.rows)
@@ -270,10 +285,36 @@ class HeadTrainer:
             factors[: self.track.size] = evening_rates(self.track, frames)
         return factors
 
+    def _eye_rows(self) -> Tensor:
+        """(R,) the basis' rows of eyes and brows."""
+        rows = torch.zeros(self.model.shape.rows, dtype=torch.bool)
+        if self.model.shape.blends:
+            rows[: self.track.size] = is_of_eyes(self.track)
+        return rows
+
     def _update_basis(
         self, weights: Tensor, gradient: Tensor, rate: float, chosen: Tensor | None = None
     ) -> None:
-        """One step on the basis, or on that of the chosen Gaussians."""
+        """One step on the basis, or on that of the chosen Gaussians.
+
+        Where there are close-ups, Gaussians at the mouth learn nothing from eyes and brows, whose
+        movements fall together with those of lips by chance alone.
+        """
+        if not self._close_ups:
+            self._update_rows(weights, gradient, rate, chosen)
+            return
+        eyes = self._eyes.to(weights.device)  # (R,)
+        self._update_rows(weights * ~eyes, gradient, rate, chosen)
+        means = self.model.means if chosen is None else self.model.means[chosen]
+        away = ~self._close_ups.at_mouth(means).to(gradient.device)  # (N or n,)
+        others = torch.nonzero(away)[:, 0]
+        others = others if chosen is None else chosen[others]
+        self._update_rows(weights * eyes, gradient[away], rate, others)
+
+    def _update_rows(
+        self, weights: Tensor, gradient: Tensor, rate: float, chosen: Tensor | None
+    ) -> None:
+        """One step on the rows of the basis whose weight is not 0."""
         update_basis(
             self._optimiser,
             self.model.basis,

@@ -221,7 +221,7 @@ PRESETS: dict[PresetName, HeadSettings] = {
         turns=True,
         basis_optimiser="rmsprop",
         even_rows=True,
-        close_ups=2,
+        close_ups=4,
         loss=Loss(perceptual=0.0, torso=0.5, alpha=0.1, squares=8.0),
         rates=Rates(
             position=2.5e-3,

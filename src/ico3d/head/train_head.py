@@ -9,6 +9,7 @@ import torch
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.lip_shapes import lip_shapes
 from ico3d.capture.parts.head_of_body import head_in
 from ico3d.capture.parts.held_out import training_part
 from ico3d.capture.parts.trained_on import trained_on
@@ -16,7 +17,13 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError
-from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
+from ico3d.head.expressions import (
+    FEATURE_RATE,
+    BlendshapeTrack,
+    ExpressionTrack,
+    SpeechTrack,
+    speech_features,
+)
 from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.model import Variant
 from ico3d.head.model_folder import Inputs, TrainedHead
@@ -24,6 +31,7 @@ from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import HeadSettings
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
+from ico3d.speech.lip_reading import read_lips
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.device import computing_device
 from ico3d.training.dry_run import Needs, needs_of
@@ -178,4 +186,12 @@ def _inputs(
     encoder = load_encoder(job.encoder)
     features = speech_features(capture, encoder, device)  # (T, D)
     adaptor = SpeechAdaptor(encoder.size, encoder.vectors)
+    frames = sorted(capture.split.train)
+    shapes = lip_shapes(capture, frames)
+    positions = np.array(frames) / capture.fps * FEATURE_RATE  # rows of features
+    if shapes is not None:
+        read_lips(adaptor, features, positions, shapes)
+    elif encoder.articulation is not None:  # what lips do in general is better than nothing
+        weight = encoder.articulation[0].numpy()  # (5, D)
+        read_lips(adaptor, features, np.arange(len(features)), features @ weight.T)
     return SpeechTrack(capture, features, adaptor), adaptor, (encoder.name, encoder.sha256)

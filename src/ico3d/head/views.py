@@ -210,4 +210,4 @@ class PictureCache(ReadAhead):
 
 
 def _as_floats(picture: np.ndarray, device: torch.device) -> Tensor:
-    return torch.from_numpy(picture).to(device).float() / 255
+    return torch.from_numpy(picture).to(device).float().div_(255)

@@ -17,6 +17,7 @@ from ico3d.common.weights import cached
 from ico3d.errors import SettingsError
 from ico3d.measure.alignment import aligned, transcripts
 from ico3d.measure.lips import lip_correlation, lip_lag_ms
+from ico3d.speech.articulation import ARTICULATION, articulation_track
 from ico3d.speech.encoder import FrozenEncoder, load_encoder
 from ico3d.speech.export import export_encoder, export_speech
 from ico3d.speech.mel import FPS, RATE
@@ -24,7 +25,6 @@ from ico3d.speech.network import AudioEncoder, SpeechAdaptor
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions, open_speech
 from ico3d.speech.training.augment import recorded
 from ico3d.speech.training.corpus import utterance
-from ico3d.speech.training.targets import ARTICULATION, articulation_track
 
 SLICE, STEP = RATE * 160 // 1000, RATE * 600 // 1000
 """Samples per piece: in short slices, and as the server takes a voice."""

@@ -14,7 +14,7 @@ from ico3d.capture.capture import Capture, Sound
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
-from ico3d.head.expressions import ExpressionTrack, turned
+from ico3d.head.expressions import ExpressionTrack, turn_values
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import (
     GREY,
@@ -52,7 +52,8 @@ class HeadRenderer:
         """(H, W, 3) the head over a picture (H, W, 3) or a colour (3,), limited to [0, 1]."""
         expression = self._track.at(view.frame)
         if self._head.turn is not None:
-            expression = turned(expression, self._head.turn, self._capture, view.frame)
+            values = turn_values(self._head.turn, self._capture, [view.frame])  # (1, 3)
+            expression = torch.cat([expression, values[0]])  # (B + 3,)
         with self.watch.picture():
             rendering = render(
                 self._head.model(expression), [view.camera], behind.to(self._head.model.device)

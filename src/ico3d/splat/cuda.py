@@ -128,3 +128,8 @@ def draw_gaussians(
     absolute = (lambda: meta["means2d"].absgrad) if absgrad else None
     info = RenderInfo(radii, meta["means2d"], width, height, absolute)
     return Drawing(rgb, alpha[..., 0], lambda: rasterise("D")[0][..., 0], info)
+
+
+def put_over(drawing: Drawing, behind: Tensor) -> Tensor:
+    """The pictures (C, H, W, 3) over a background (3,), (H, W, 3) or (C, H, W, 3)."""
+    return drawing.rgb + (1 - drawing.alpha)[..., None] * behind

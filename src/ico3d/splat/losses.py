@@ -80,9 +80,9 @@ def tensor_psnr(rgb: Tensor, target: Tensor, weight: Tensor | None = None) -> fl
         target: (H, W, 3) in [0, 1].
         weight: (H, W) weight of each pixel in [0, 1]; all pixels count fully by default.
     """
-    squares = (rgb.detach() - target).square()  # (H, W, 3)
     if weight is None:
-        return decibels(float(squares.mean()))
+        return decibels(float(torch.nn.functional.mse_loss(rgb.detach(), target)))
+    squares = (rgb.detach() - target).square()  # (H, W, 3)
     squares = squares.mean(-1)  # (H, W)
     return decibels(float((squares * weight).sum() / weight.sum().clamp_min(1)))
 
@@ -101,15 +101,17 @@ class _CpuPhotometric(torch.autograd.Function):
             *(photometric_with_gradient(x.numpy(), y.numpy(), ssim, l1, squares) for x, y in pairs),
             strict=True,
         )
-        stacked = [torch.from_numpy(gradient) for gradient in gradients]
-        ctx.gradient = torch.stack(stacked) / len(values)  # (C, H, W, 3)
+        stacked = [torch.from_numpy(gradient)[None] for gradient in gradients]
+        few = stacked[0] if len(values) == 1 else torch.cat(stacked) / len(values)
+        ctx.gradient = few  # (C, H, W, 3)
         return images.new_tensor(sum(values) / len(values))
 
     @staticmethod
     @once_differentiable
     # type: ignore (torch's own takes any number of gradients)
     def backward(ctx: Any, g_value: Tensor) -> tuple[Tensor, None, None, None, None]:
-        return ctx.gradient * g_value, None, None, None, None
+        whole = float(g_value) == 1
+        return ctx.gradient if whole else ctx.gradient * g_value, None, None, None, None
 
 
 def _photometric_by_torch(

@@ -66,8 +66,7 @@ def render(
     drawing = backend.draw_gaussians(gaussians, colors, cameras, poses, antialiased, absgrad)
     rgb = drawing.rgb
     if background is not None:
-        behind = background.to(rgb)
-        rgb = rgb + (1 - drawing.alpha)[..., None] * behind  # (C, H, W, 3)
+        rgb = backend.put_over(drawing, background.to(rgb))  # (C, H, W, 3)
     return Rendering(rgb, drawing.alpha, drawing)
 
 

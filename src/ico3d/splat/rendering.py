@@ -52,10 +52,10 @@ class RenderInfo:
         """
         if self.means2d.grad is None:
             raise RuntimeError("screen gradients exist only after backward of a render")
-        half = torch.tensor([self.width / 2, self.height / 2]).to(self.means2d)  # (2,)
         gradient = self.means2d.grad if self.absolute is None else self.absolute()  # (C, N, 2)
         count = self.radii.shape[1]
-        return (gradient[:, :count] * half).norm(dim=-1)  # (C, N)
+        x, y = gradient[:, :count].unbind(-1)  # (C, N) each
+        return torch.hypot(x * (self.width / 2), y * (self.height / 2))  # (C, N)
 
 
 @dataclass

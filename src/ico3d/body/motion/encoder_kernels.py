@@ -8,14 +8,14 @@ have a fixed length, which LLVM unrolls.
 import numba
 import numpy as np
 
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import kernel, subroutine
 
 LANES = 16
 """Channels in a group."""
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _place(position, places):
     """Where a position in −1 … 1 lies among nodes.
 
@@ -30,7 +30,7 @@ def _place(position, places):
     return node, place - np.float32(node), slope
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _corners(plane, row, column, group):
     """Views of a group of channels at the four nodes about a place.
 
@@ -44,7 +44,7 @@ def _corners(plane, row, column, group):
     )
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _sample(corners, x, y, out):
     """Writes the bilinear sample of four nodes: `x` is the share of columns, `y` that of rows."""
     a, b, c, d = corners
@@ -53,7 +53,7 @@ def _sample(corners, x, y, out):
         out[k] = wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k]
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _sample_line(line, node, part, group, out):
     """Writes the linear sample between a node and the next."""
     a, b = line[node, group], line[node + 1, group]
@@ -61,7 +61,7 @@ def _sample_line(line, node, part, group, out):
         out[k] = (ONE - part) * a[k] + part * b[k]
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _sample_all(planes, lines, x, y, z, group, samples):
     """Writes the samples of xy, xz, yz, xt, yt and zt, in this order, `LANES` numbers each."""
     _sample(_corners(planes[0], y[0], x[0], group), x[1], y[1], samples)
@@ -72,14 +72,14 @@ def _sample_all(planes, lines, x, y, z, group, samples):
     _sample_line(lines[2], z[0], z[1], group, samples[5 * LANES :])
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _product(s, out):
     for k in range(LANES):
         first = s[k] * s[LANES + k] * s[2 * LANES + k]
         out[k] = first * s[3 * LANES + k] * s[4 * LANES + k] * s[5 * LANES + k]
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _product_backward(s, gradient):
     """Writes the gradients of the six samples behind the six samples."""
     for k in range(LANES):
@@ -96,13 +96,13 @@ def _product_backward(s, gradient):
         s[11 * LANES + k] = third * e
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _add(out, weight, gradient):
     for k in range(LANES):
         out[k] += weight * gradient[k]
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _scatter(corners, sums, x, y, gradient):
     """Adds to the gradients of four nodes; returns the derivatives by the shares x and y."""
     a, b, c, d = corners
@@ -120,7 +120,7 @@ def _scatter(corners, sums, x, y, gradient):
     return (ONE - y) * (gb - ga) + y * (gd - gc), (ONE - x) * (gc - ga) + x * (gd - gb)
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _scatter_line(line, sums, node, part, group, gradient):
     """Adds to the gradients of two nodes; returns the derivative by the share `part`."""
     a, b = line[node, group], line[node + 1, group]

@@ -10,7 +10,7 @@ rows are rounded up to multiples of four (`padded`), with rows of zeros.
 import numba
 import numpy as np
 
-from ico3d.splat.cpu.compile import PARTS, kernel
+from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 
 BLOCK = 128
 """Points in a block."""
@@ -24,7 +24,7 @@ def padded(rows: int) -> int:
     return -(-rows // FOUR) * FOUR
 
 
-@kernel()
+@subroutine()
 def _read(values, first, rows):
     """Writes the rows of the block of points from `first` on; zeros past the last point."""
     count = min(BLOCK, values.shape[0] - first)
@@ -36,7 +36,7 @@ def _read(values, first, rows):
     rows[values.shape[1] * BLOCK :] = ZERO
 
 
-@kernel()
+@subroutine()
 def _write(rows, first, values):
     """Copies the rows of a block into the values of its points; inverse of `_read`."""
     for p in range(min(BLOCK, values.shape[0] - first)):
@@ -44,7 +44,7 @@ def _write(rows, first, values):
             values[first + p, k] = rows[k * BLOCK + p]
 
 
-@kernel()
+@subroutine()
 def _blend(x, inputs, alpha, sets, out):
     """Writes a layer's blended rows: features times each α, then α, then zeros."""
     for m in range(sets):
@@ -60,7 +60,7 @@ def _blend(x, inputs, alpha, sets, out):
     last[sets * BLOCK :] = ZERO
 
 
-@kernel()
+@subroutine()
 def _unblend(x, inputs, alpha, sets, gradient, g_x, g_alpha):
     """From the gradient of blended rows: writes that of the features, adds to that of α."""
     g_x[:] = ZERO
@@ -79,7 +79,7 @@ def _unblend(x, inputs, alpha, sets, gradient, g_x, g_alpha):
                 by_factor[p] += source[p] * g[p]
 
 
-@kernel()
+@subroutine()
 def _multiply(x, rows, weights, columns, out):
     """Writes `columns` rows: sums of the `rows` rows of x times weights[row·columns + column].
 
@@ -106,7 +106,7 @@ def _multiply(x, rows, weights, columns, out):
                 o[3 * BLOCK + p] += a3 * a + b3 * b + c3 * c + d3 * d
 
 
-@kernel()
+@subroutine()
 def _products(x, y, out, columns):
     """Adds the 16 inner products of four rows of x and four of y to a 4 × 4 part of a matrix.
 
@@ -139,7 +139,7 @@ def _products(x, y, out, columns):
     _add(out[3 * columns :], d0, d1, d2, d3)
 
 
-@kernel()
+@subroutine()
 def _add(out, a, b, c, d):
     out[0] += a
     out[1] += b
@@ -147,7 +147,7 @@ def _add(out, a, b, c, d):
     out[3] += d
 
 
-@kernel()
+@subroutine()
 def _weight_gradients(x, rows, gradient, columns, out):
     """Adds inner products of each row of x and each of the gradient to out (rows·columns,)."""
     for r in range(0, rows, FOUR):
@@ -155,13 +155,13 @@ def _weight_gradients(x, rows, gradient, columns, out):
             _products(x[r * BLOCK :], gradient[j * BLOCK :], out[r * columns + j :], columns)
 
 
-@kernel()
+@subroutine()
 def _relu(rows):
     for i in range(rows.size):
         rows[i] = max(rows[i], ZERO)
 
 
-@kernel()
+@subroutine()
 def _relu_backward(rows, gradient):
     for i in range(gradient.size):
         gradient[i] = gradient[i] if rows[i] > ZERO else ZERO

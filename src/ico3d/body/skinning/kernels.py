@@ -7,7 +7,7 @@ A joint's row of the table holds its rotation matrix (9), its translation (3) an
 import numba
 import numpy as np
 
-from ico3d.splat.cpu.compile import PARTS, kernel
+from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 
 ROW = 16
 """Numbers in the row of a joint."""
@@ -15,7 +15,7 @@ INFLUENCES = 4
 """Joints that carry a Gaussian."""
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _blend(table, joints, logits, weights, mixed):
     """Writes the softmax of four logits as weights, and the joints' rows mixed by these weights."""
     most = max(max(logits[0], logits[1]), max(logits[2], logits[3]))
@@ -65,7 +65,7 @@ def forward(table, joints, logits, means, quats, normals, out_means, out_quats, 
             out_quats[i, 3] = w * a[3] + u * a[2] - v * a[1] + t * a[0]
 
 
-@kernel(inline=True)
+@subroutine(inline=True)
 def _blend_backward(m, x, n, a, g, gn, h, row):
     """Writes the gradient of the mixed row (16,) of one Gaussian.
 

@@ -7,27 +7,38 @@ there is four times slower.
 """
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from ico3d.splat.cpu.compile import kernel
 from ico3d.training.optimiser import BETA1, BETA2, EPSILON
 
 BLOCK = 2048
+FOUR = 4
+"""Rows that are blended at once: memory delivers several streams faster than one after another."""
 
 
-@njit(parallel=True, fastmath=True, cache=True)
+@kernel(parallel=True)
 def blend_rows(basis, weights, rows, out):
     """Writes Σ weights[r]·basis[r], summed over `rows`, to out (S,)."""
+    fours = rows.size // FOUR * FOUR
     for block in prange((out.size + BLOCK - 1) // BLOCK):
-        target = out[block * BLOCK : (block + 1) * BLOCK]
+        low, high = block * BLOCK, min((block + 1) * BLOCK, out.size)
+        target = out[low:high]
         target[:] = 0
-        for r in rows:
-            source = basis[r, block * BLOCK : (block + 1) * BLOCK]
-            weight = weights[r]
+        for k in range(0, fours, FOUR):
+            r0, r1, r2, r3 = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
+            w0, w1, w2, w3 = weights[r0], weights[r1], weights[r2], weights[r3]
+            b0, b1, b2, b3 = basis[r0], basis[r1], basis[r2], basis[r3]
+            b0, b1, b2, b3 = b0[low:high], b1[low:high], b2[low:high], b3[low:high]
+            for i in range(target.size):
+                target[i] += w0 * b0[i] + w1 * b1[i] + w2 * b2[i] + w3 * b3[i]
+        for k in range(fours, rows.size):
+            weight, source = weights[rows[k]], basis[rows[k], low:high]
             for i in range(target.size):
                 target[i] += weight * source[i]
 
 
-@njit(parallel=True, fastmath=True, cache=True)
+@kernel(parallel=True)
 def blend_some(basis, weights, rows, chosen, out):
     """As `blend_rows`, of some Gaussians: those numbered in `chosen`, to out (n, w)."""
     width = out.shape[1]
@@ -44,7 +55,7 @@ def blend_some(basis, weights, rows, chosen, out):
                     target[i] += weight * source[i]
 
 
-@njit(parallel=True, fastmath=True, cache=True)
+@kernel(parallel=True)
 def row_products(basis, gradient, out):
     """Writes basis · gradient to out (R,), which is the gradient of the row weights."""
     for r in prange(basis.shape[0]):
@@ -55,7 +66,7 @@ def row_products(basis, gradient, out):
         out[r] = total
 
 
-@njit(parallel=True, fastmath=True, cache=True)
+@kernel(parallel=True)
 def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, pulls):
     """One Adam step, in place, with the gradient weights ⊗ gradient, which is never stored.
 
@@ -85,7 +96,7 @@ def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, p
                 value[i] -= step * m[i] / (np.sqrt(v[i]) * root + epsilon)
 
 
-@njit(parallel=True, fastmath=True, cache=True)
+@kernel(parallel=True)
 def rmsprop_rank_one(basis, second, weights, gradient, rows, rates, roots, pulls, chosen):
     """One RMSProp step, in place, with the gradient weights ⊗ gradient, which is never stored.
 

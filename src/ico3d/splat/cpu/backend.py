@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from ico3d.common.camera import Camera
-from ico3d.splat.cpu.rasterise import Draw, Project, bin_views, camera_numbers
+from ico3d.splat.cpu.rasterise import Draw, Over, Project, bin_views, camera_numbers
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.rendering import Drawing, RenderInfo
 
@@ -61,3 +61,9 @@ def draw_gaussians(
     radii = extents.amax(-1).ceil().int()  # (C, N)
     info = RenderInfo(radii, means2d, width, height, None if absolute is None else lambda: absolute)
     return Drawing(images, 1 - light, draw_depth, info)
+
+
+def put_over(drawing: Drawing, behind: Tensor) -> Tensor:
+    """The pictures (C, H, W, 3) over a background (3,), (H, W, 3) or (C, H, W, 3)."""
+    spread = behind.expand_as(drawing.rgb)  # (C, H, W, 3)
+    return Over.apply(drawing.rgb, drawing.alpha, spread)  # type: ignore[no-any-return]

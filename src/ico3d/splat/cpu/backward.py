@@ -10,7 +10,7 @@ from math import exp2, log
 import numba
 import numpy as np
 
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.splat.cpu.forward import (
     CHECK,
     HALF,
@@ -36,7 +36,7 @@ ABSOLUTE = 2
 TWICE_LOG_2 = np.float32(2 * log(2))
 
 
-@kernel()
+@subroutine()
 def _pixel_positions(state, plane):
     """Writes pixel centres, relative to the tile's first pixel, into two planes of a state."""
     for p in range(BLOCK * PIXELS):
@@ -44,7 +44,7 @@ def _pixel_positions(state, plane):
         state[(plane + 1) * PLANE + p] = np.float32(p % PIXELS // TILE_WIDTH)
 
 
-@kernel()
+@subroutine()
 def _gather(state, first, end, splat, absolute, out):
     """Sums one splat's gradients over the rows from `first` to `end` of a tile.
 
@@ -94,7 +94,7 @@ def _gather(state, first, end, splat, absolute, out):
         out[9], out[10] = TWICE_LOG_2 * by_x * absolute_x, TWICE_LOG_2 * absolute_y
 
 
-@kernel()
+@subroutine()
 def _read(state, image, light, g_image, g_light):
     """Reads a block's pixel gradients and what the loss owes to the whole pixel."""
     state[:PLANE] = ONE
@@ -110,7 +110,7 @@ def _read(state, image, light, g_image, g_light):
             state[4 * PLANE + p] = blue
 
 
-@kernel()
+@subroutine()
 def _collect(state, records, entries, center, splats, parts):
     """Writes the gradients of the pairs of one tile, whose state begins here."""
     done, absolute = False, parts.shape[1] > GRADIENTS

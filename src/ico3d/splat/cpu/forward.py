@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from ico3d.splat import convention
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, Tiles, tiles_across, unpack_rows
 
 PIXELS = TILE_WIDTH * TILE_HEIGHT
@@ -51,7 +51,7 @@ def power_of_two(x):
     return np.int32(bits).view(np.float32)
 
 
-@kernel()
+@subroutine()
 def finished(state):
     """Whether every pixel of the tile at the start of `state` has used up its transmittance."""
     for y in range(TILE_HEIGHT):
@@ -63,7 +63,7 @@ def finished(state):
     return True
 
 
-@kernel()
+@subroutine()
 def _blend(state, first, end, splat):
     """Composites one splat into the rows from `first` to `end` of a tile.
 
@@ -92,21 +92,21 @@ def _blend(state, first, end, splat):
             state[np.uint64(3 * PLANE) + p] += weight * b
 
 
-@kernel()
+@subroutine()
 def window(image, block, across):
     """The part of an image (H, W, ...) that a block of tiles covers."""
     left, top = block * BLOCK % across * TILE_WIDTH, block * BLOCK // across * TILE_HEIGHT
     return image[top : top + TILE_HEIGHT, left : left + BLOCK * TILE_WIDTH]
 
 
-@kernel()
+@subroutine()
 def first_center(tile, across):
     """Pixel coordinates of the centre of a tile's first pixel."""
     left, top = tile % across * TILE_WIDTH, tile // across * TILE_HEIGHT
     return np.float32(left) + HALF, np.float32(top) + HALF
 
 
-@kernel()
+@subroutine()
 def _write_row(state, width, image, light):
     """Writes one row of a tile, whose state begins here."""
     for x in range(width):
@@ -116,7 +116,7 @@ def _write_row(state, width, image, light):
         image[x, 2] = state[3 * PLANE + x]
 
 
-@kernel()
+@subroutine()
 def _write(state, image, light):
     """Writes a block into its part of the image."""
     whole = light.shape[1] == BLOCK * TILE_WIDTH
@@ -130,7 +130,7 @@ def _write(state, image, light):
                 _write_row(row, width, image[y, left:], light[y, left:])
 
 
-@kernel()
+@subroutine()
 def load(records, entries, center, splats):
     """Copies the records of some entries into `splats`, relative to the tile's first pixel.
 
@@ -145,7 +145,7 @@ def load(records, entries, center, splats):
         splat[6], splat[7], splat[8] = r, g, b
 
 
-@kernel()
+@subroutine()
 def _draw(state, records, entries, center, splats):
     """Draws one tile, whose state begins here, from its entries."""
     for start in range(0, entries.shape[0], CHECK):

@@ -8,13 +8,13 @@
 from math import sqrt
 
 from ico3d.splat.convention import FRUSTUM_MARGIN
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import subroutine
 
 CAMERA_SIZE = 16
 """Numbers that describe a camera: fx, fy, cx, cy, rotation (9, row by row), translation (3)."""
 
 
-@kernel()
+@subroutine()
 def rotation(w, x, y, z):
     """Rotation matrix of a quaternion as three rows; the quaternion need not be normalised."""
     norm = 1.0 / sqrt(w * w + x * x + y * y + z * z)
@@ -26,7 +26,7 @@ def rotation(w, x, y, z):
     )
 
 
-@kernel()
+@subroutine()
 def camera_space(camera, mean):
     """A world point in the camera's axes."""
     x = camera[4] * mean[0] + camera[5] * mean[1] + camera[6] * mean[2] + camera[13]
@@ -35,14 +35,14 @@ def camera_space(camera, mean):
     return x, y, z
 
 
-@kernel()
+@subroutine()
 def clamped_slope(slope, focal, center, size):
     """The slope x/z, limited to a margin around the image, beyond which the linearisation fails."""
     margin = FRUSTUM_MARGIN * 0.5 * size / focal
     return min(max(slope, -center / focal - margin), (size - center) / focal + margin)
 
 
-@kernel()
+@subroutine()
 def jacobian(camera, x, y, z, width, height):
     """The four non-zero entries of the projection's Jacobian: 00, 02, 11, 12."""
     slope_x = clamped_slope(x / z, camera[0], camera[2], width)
@@ -50,7 +50,7 @@ def jacobian(camera, x, y, z, width, height):
     return camera[0] / z, -camera[0] * slope_x / z, camera[1] / z, -camera[1] * slope_y / z
 
 
-@kernel()
+@subroutine()
 def pixel_from_world(camera, j00, j02, j11, j12):
     """The projection's Jacobian times the camera's rotation: two rows of three numbers."""
     return (
@@ -67,13 +67,13 @@ def pixel_from_world(camera, j00, j02, j11, j12):
     )
 
 
-@kernel()
+@subroutine()
 def dot(a, b):
     """Dot product of two triples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel()
+@subroutine()
 def row_times_scaled(row, turn, scale):
     """A row times R·S: one row of the square root of the 2D covariance."""
     return (
@@ -83,7 +83,7 @@ def row_times_scaled(row, turn, scale):
     )
 
 
-@kernel()
+@subroutine()
 def determinant(p, q):
     """Determinant of [p; q]·[p; q]ᵀ, computed as |p × q|² to avoid cancellation."""
     x = p[1] * q[2] - p[2] * q[1]

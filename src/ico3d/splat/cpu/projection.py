@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from ico3d.splat.convention import BLUR, MIN_ALPHA, NEAR
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.splat.cpu.geometry import (
     camera_space,
     determinant,
@@ -26,7 +26,7 @@ FARTHEST = 1e6
 """Largest extent of a splat in pixels; tile counts must fit into integers."""
 
 
-@kernel()
+@subroutine()
 def _project(camera, mean, quat, scale, opacity, width, height, antialiased, mean2d, conic, extent):
     """Projects one Gaussian; returns its depth and the opacity left after the low-pass.
 

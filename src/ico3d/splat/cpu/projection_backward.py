@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from ico3d.splat.convention import BLUR
-from ico3d.splat.cpu.compile import PARTS, kernel
+from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 from ico3d.splat.cpu.geometry import (
     camera_space,
     clamped_slope,
@@ -29,7 +29,7 @@ POSE = 12
 """Gradients per camera: rotation (9, row by row), translation (3)."""
 
 
-@kernel()
+@subroutine()
 def _covariance_gradient(xx, xy, yy, sharp, opacity, antialiased, g_conic, g_alpha):
     """Gradient of the sharp covariance's entries xx, xy, yy, and of the opacity.
 
@@ -56,7 +56,7 @@ def _covariance_gradient(xx, xy, yy, sharp, opacity, antialiased, g_conic, g_alp
     return g_xx, g_xy, g_yy, g_alpha * factor
 
 
-@kernel()
+@subroutine()
 def _local_gradient(camera, x, y, z, width, height, g_mean2d, g_depth, g_j):
     """Gradient of the mean in camera axes: by its pixel, its depth and the Jacobian taken at it."""
     fx, fy = camera[0], camera[1]
@@ -75,7 +75,7 @@ def _local_gradient(camera, x, y, z, width, height, g_mean2d, g_depth, g_j):
     return g_x, g_y, g_z
 
 
-@kernel()
+@subroutine()
 def _pose_gradient(local, mean, j, g_x, g_y, g_camera):
     """Adds the gradient of the camera's rotation (9, by rows) and translation (3).
 
@@ -94,7 +94,7 @@ def _pose_gradient(local, mean, j, g_x, g_y, g_camera):
         g_camera[9 + k] += local[k]
 
 
-@kernel()
+@subroutine()
 def _quat_gradient(quat, g_turn, g_quat):
     """Adds the gradient of an unnormalised quaternion from that of its rotation matrix."""
     norm = 1.0 / sqrt(quat[0] ** 2 + quat[1] ** 2 + quat[2] ** 2 + quat[3] ** 2)
@@ -111,7 +111,7 @@ def _quat_gradient(quat, g_turn, g_quat):
     g_quat[3] += (g_z - along * z) * norm
 
 
-@kernel()
+@subroutine()
 def _unscale(row, a, g_a, b, g_b, scale):
     """Row of the gradient of R·S that pixel rows a and b give at world axis `row`."""
     return (
@@ -121,14 +121,14 @@ def _unscale(row, a, g_a, b, g_b, scale):
     )
 
 
-@kernel()
+@subroutine()
 def _back(row, turn, scale):
     """A gradient row times (R·S)ᵀ."""
     scaled = (row[0] * scale[0], row[1] * scale[1], row[2] * scale[2])
     return dot(turn[0], scaled), dot(turn[1], scaled), dot(turn[2], scaled)
 
 
-@kernel()
+@subroutine()
 def _project_backward(
     camera, mean, quat, scale, opacity, width, height, antialiased, gradient, out, g_camera
 ):

@@ -15,6 +15,7 @@ from torch.autograd.function import once_differentiable
 
 from ico3d.common.camera import Camera
 from ico3d.splat.cpu.backward import draw_backward
+from ico3d.splat.cpu.compositing import put_over, put_over_backward
 from ico3d.splat.cpu.forward import draw, splat_records
 from ico3d.splat.cpu.projection import project
 from ico3d.splat.cpu.projection_backward import project_backward
@@ -35,6 +36,11 @@ def camera_numbers(cameras: Sequence[Camera], poses: Tensor) -> Tensor:
 
 def _array(tensor: Tensor) -> np.ndarray:
     return tensor.detach().contiguous().numpy()
+
+
+def _stacked(arrays: Sequence[np.ndarray]) -> Tensor:
+    """Arrays of one shape as a tensor (C, ...); a single one is not copied."""
+    return torch.from_numpy(arrays[0][None] if len(arrays) == 1 else np.stack(arrays))
 
 
 class Project(torch.autograd.Function):
@@ -117,7 +123,7 @@ class Draw(torch.autograd.Function):
         drawn = [draw(r, t) for r, t in zip(records, tiles, strict=True)]
         ctx.problem, ctx.absolute = (records, tiles, drawn), absolute
         images, lights = zip(*drawn, strict=True)
-        return torch.from_numpy(np.stack(images)), torch.from_numpy(np.stack(lights))
+        return _stacked(images), _stacked(lights)
 
     @staticmethod
     @once_differentiable
@@ -126,18 +132,42 @@ class Draw(torch.autograd.Function):
         """Gradients of means2d, conics, alphas and colors."""
         wanted = ctx.absolute is not None
         views = zip(*ctx.problem, _array(g_images), _array(g_lights), strict=True)
-        gradients = torch.from_numpy(
-            np.stack(
-                [
-                    draw_backward(records, tiles, image, light, g_image, g_light, wanted)
-                    for records, tiles, (image, light), g_image, g_light in views
-                ]
-            )
+        gradients = _stacked(
+            [
+                draw_backward(records, tiles, image, light, g_image, g_light, wanted)
+                for records, tiles, (image, light), g_image, g_light in views
+            ]
         )  # (C, N, 9 or 11)
         means2d, conics, alphas, colors = gradients[..., :9].split([2, 3, 1, 3], -1)
         if wanted:
             ctx.absolute += gradients[..., 9:]
         return means2d, conics, alphas[..., 0], colors, None, None
+
+
+class Over(torch.autograd.Function):
+    """Autograd function that puts a picture on black over a background."""
+
+    @staticmethod
+    def forward(ctx: Any, image: Tensor, alpha: Tensor, behind: Tensor) -> Tensor:
+        """Returns (C, H, W, 3) for images (C, H, W, 3), alphas (C, H, W) and (C, H, W, 3)."""
+        out = torch.empty_like(image, memory_format=torch.contiguous_format)
+        arrays = (_array(image), _array(alpha), _array(behind))
+        put_over(*(array.reshape(-1) for array in (*arrays, out.numpy())))
+        ctx.arrays = arrays[1:]
+        return out
+
+    @staticmethod
+    @once_differentiable
+    # type: ignore (torch's own takes any number of gradients)
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
+        """Gradients of images, alphas and, where it is wanted, the background."""
+        alpha, behind = ctx.arrays
+        by_alpha = torch.empty(alpha.shape)
+        parts = (behind, _array(gradient), by_alpha.numpy())
+        put_over_backward(*(array.reshape(-1) for array in parts))
+        if not ctx.needs_input_grad[2]:
+            return gradient, by_alpha, None
+        return gradient, by_alpha, gradient * torch.from_numpy(1 - alpha)[..., None]
 
 
 def bin_views(

@@ -1,4 +1,7 @@
-"""SSIM, L1 and squares of two pictures with their gradient: blurs over rows of interleaved RGB."""
+"""SSIM, L1 and squares of two pictures with their gradient: blurs over rows of interleaved RGB.
+
+SSIM asks for the sum of both variances alone, so x² + y² is blurred as one map.
+"""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -9,16 +12,18 @@ import numba
 import numpy as np
 
 from ico3d.splat.convention import SSIM_C1, SSIM_C2, SSIM_RADIUS, ssim_window
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import kernel, subroutine
 
 CHANNELS = 3
 PAD = SSIM_RADIUS * CHANNELS
+MOMENTS = 4
+"""Blurred maps: x, y, x² + y², xy."""
 W0, W1, W2, W3, W4, W5 = map(np.float32, ssim_window()[SSIM_RADIUS:])
 C1, C2 = np.float32(SSIM_C1), np.float32(SSIM_C2)
 ONE, TWO = np.float32(1), np.float32(2)
 
 
-@kernel()
+@subroutine()
 def _blur_row(padded, out):
     """Blurs a row along x; `padded` has `PAD` zeros at both ends."""
     for i in range(out.size):
@@ -32,19 +37,19 @@ def _blur_row(padded, out):
         )
 
 
-@kernel()
+@subroutine()
 def _near_rows(a, b, c, d, e, out):
     for i in range(out.size):
         out[i] = W0 * c[i] + W1 * (b[i] + d[i]) + W2 * (a[i] + e[i])
 
 
-@kernel()
+@subroutine()
 def _far_rows(a, b, c, d, e, f, out):
     for i in range(out.size):
         out[i] += W3 * (c[i] + d[i]) + W4 * (b[i] + e[i]) + W5 * (a[i] + f[i])
 
 
-@kernel()
+@subroutine()
 def _blur_column(rows, out):
     """Blurs along y: the weighted sum of 11 rows.
 
@@ -54,64 +59,68 @@ def _blur_column(rows, out):
     _far_rows(rows[0], rows[1], rows[2], rows[8], rows[9], rows[10], out)
 
 
-@kernel()
+@subroutine()
 def _copy(a, out):
     """`out[:] = a`, which takes seconds to compile for what it would say if sizes differed."""
     for i in range(a.size):
         out[i] = a[i]
 
 
-@kernel()
+@subroutine()
 def _product(a, b, out):
     for i in range(a.size):
         out[i] = a[i] * b[i]
 
 
-@kernel()
+@subroutine()
+def _squares(a, b, out):
+    for i in range(a.size):
+        out[i] = a[i] * a[i] + b[i] * b[i]
+
+
+@subroutine()
 def _moments(x, y, padded, maps):
-    """Rows of x, y, x², y², xy, blurred along x."""
+    """Rows of x, y, x² + y², xy, blurred along x."""
     inner = padded[PAD : PAD + x.size]
     _copy(x, inner)
     _blur_row(padded, maps[0])
     _copy(y, inner)
     _blur_row(padded, maps[1])
-    _product(x, x, inner)
+    _squares(x, y, inner)
     _blur_row(padded, maps[2])
-    _product(y, y, inner)
-    _blur_row(padded, maps[3])
     _product(x, y, inner)
-    _blur_row(padded, maps[4])
+    _blur_row(padded, maps[3])
 
 
-@kernel()
+@subroutine()
 def _similarity(stats, by_mean):
-    """Sum of SSIM over a row; overwrites the blurred x², xy with the derivatives by them.
+    """Sum of SSIM over a row; overwrites the blurred x² + y², xy with the derivatives by them.
 
     `by_mean` gets the derivative by blurred x.
     """
-    mean_x, mean_y, xx, yy, xy = stats[0], stats[1], stats[2], stats[3], stats[4]
+    mean_x, mean_y, both, xy = stats[0], stats[1], stats[2], stats[3]
     total = np.float32(0)
     for i in range(by_mean.size):
         mx, my = mean_x[i], mean_y[i]
         a1, b1 = TWO * mx * my + C1, mx * mx + my * my + C1
         a2 = TWO * (xy[i] - mx * my) + C2
-        b2 = xx[i] - mx * mx + yy[i] - my * my + C2
+        b2 = both[i] - mx * mx - my * my + C2
         scale = ONE / (b1 * b2)
         value = a1 * a2 * scale
         total += value
-        by_mean[i] = TWO * (my * scale * (a2 - a1) + mx * value * (ONE / b2 - ONE / b1))
-        xx[i] = -value / b2
+        by_mean[i] = TWO * scale * (my * (a2 - a1) + mx * value * (b1 - b2))
+        both[i] = -value * b1 * scale
         xy[i] = TWO * a1 * scale
     return total
 
 
-@kernel()
+@subroutine()
 def _combine(x, y, by_mean, by_xx, by_xy, scale, out):
     for i in range(out.size):
         out[i] = scale * (by_mean[i] + TWO * x[i] * by_xx[i] + y[i] * by_xy[i])
 
 
-@kernel()
+@subroutine()
 def _add_differences(x, y, by_absolute, by_square, out):
     """Sums of |x − y| and (x − y)² over a row; adds their weighted derivatives to `out`."""
     absolute, square = np.float32(0), np.float32(0)
@@ -135,9 +144,9 @@ def _blur_moments(x, y, maps):
 def _compare(maps, sums, derivatives):
     for row in numba.prange(sums.shape[0]):
         width = maps.shape[2]
-        stats = np.empty((5, width), np.float32)
+        stats = np.empty((MOMENTS, width), np.float32)
         by_mean = np.empty(width, np.float32)
-        for k in range(5):
+        for k in range(MOMENTS):
             _blur_column(maps[row : row + 11, k], stats[k])
         sums[row, 0] = _similarity(stats, by_mean)
         padded = np.zeros(width + 2 * PAD, np.float32)
@@ -146,7 +155,7 @@ def _compare(maps, sums, derivatives):
         _blur_row(padded, derivatives[SSIM_RADIUS + row, 0])
         _copy(stats[2], inner)
         _blur_row(padded, derivatives[SSIM_RADIUS + row, 1])
-        _copy(stats[4], inner)
+        _copy(stats[3], inner)
         _blur_row(padded, derivatives[SSIM_RADIUS + row, 2])
 
 
@@ -186,7 +195,7 @@ def photometric_with_gradient(
     """
     height, width = x.shape[0], x.shape[1] * CHANNELS
     x, y = x.reshape(height, width), y.reshape(height, width)
-    maps, derivatives = _padded_rows(height, 5, width), _padded_rows(height, 3, width)
+    maps, derivatives = _padded_rows(height, MOMENTS, width), _padded_rows(height, 3, width)
     sums, gradient = np.empty((height, 3), np.float32), np.empty_like(x)
     scales = np.array([-similarity, l1, 2 * squares]).astype(np.float32) / np.float32(x.size)
     _blur_moments(x, y, maps)

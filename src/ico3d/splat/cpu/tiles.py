@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from ico3d.splat.convention import MIN_ALPHA
-from ico3d.splat.cpu.compile import PARTS, kernel
+from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 
 TILE_WIDTH, TILE_HEIGHT = 8, 64
 """Size of a tile in pixels: narrow tiles waste few pixels beside a splat, tall ones save pairs."""
@@ -68,7 +68,7 @@ def tiles_across(width: int) -> int:
     return -(-width // (TILE_WIDTH * BLOCK)) * BLOCK
 
 
-@kernel()
+@subroutine()
 def pack_rows(first, end):
     """First and end row of a tile in one number, which saves memory."""
     return first * ROWS + end
@@ -80,20 +80,20 @@ def unpack_rows(rows):
     return np.uint64(rows) // np.uint64(ROWS), np.uint64(rows) % np.uint64(ROWS)
 
 
-@kernel()
+@subroutine()
 def _span(low, high, tile, count):
     """First and end of the `count` tiles that the pixel range [low, high] touches."""
     return max(0, floor(low / tile)), min(count, floor(high / tile) + 1)
 
 
-@kernel()
+@subroutine()
 def _columns(splat, across):
     """First and end column of tiles that a splat touches."""
     reach = splat[6] + SLACK
     return _span(splat[0] - reach, splat[0] + reach, TILE_WIDTH, across)
 
 
-@kernel()
+@subroutine()
 def _most_pairs(splat, across, down):
     """How many pairs a splat has at most: the tiles of its box."""
     left, right = _columns(splat, across)
@@ -136,7 +136,7 @@ def _sort(parts, order, splats, across, down, ordered):
     return rooms.cumsum()
 
 
-@kernel()
+@subroutine()
 def _reach(tip, discriminant, room, b, low, high):
     """Range of 2q·v in the ellipse p·u² + b·u·v + q·v² ≤ cut, given that u lies in [low, high].
 
@@ -159,7 +159,7 @@ def _reach(tip, discriminant, room, b, low, high):
     return -b * bottom - sqrt(under_bottom), -b * top + sqrt(under_top)
 
 
-@kernel()
+@subroutine()
 def _list(splat, number, across, down, pair, counts, pairs):
     """Lists the tiles of a splat and the rows it touches there, from pair `pair` on.
 
