@@ -23,7 +23,8 @@ export default defineConfig({
         // Side by side, and kept by browsers when only the page itself has changed.
         codeSplitting: {
           groups: [
-            { name: 'three', test: /node_modules\/three\// },
+            { name: 'three', test: /three\/build\/three\.core/, priority: 2 },
+            { name: 'three-webgl', test: /three\/build\/three\.module/, priority: 1 }, // its renderer
             { name: 'spark', test: /node_modules\/@sparkjsdev\// },
           ],
         },
@@ -64,7 +65,25 @@ export default defineConfig({
           hookTimeout: 120_000,
         },
       },
-      { extends: true, test: { name: 'bench', include: ['bench/*.ts', 'bench/soft/*.ts'], testTimeout: 600_000 } },
+      {
+        extends: true,
+        test: {
+          name: 'pictures',
+          include: ['bench/pictures/*.spec.ts'],
+          globalSetup: ['support/scratch.ts', 'support/servers/shared.ts'],
+          maxWorkers: 1,
+          testTimeout: 240_000,
+        },
+      },
+      {
+        extends: true,
+        test: {
+          name: 'bench',
+          include: ['bench/*.ts', 'bench/soft/*.ts'],
+          maxWorkers: 1, // one after the other: all of them measure the machine
+          testTimeout: 900_000,
+        },
+      },
     ],
   },
 });

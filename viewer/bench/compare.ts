@@ -1,5 +1,6 @@
 import { createServer } from 'vite';
 import { Browser } from '../support/browser/browser.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { lookAsBundled, psnr, takePixels } from '../support/browser/pictures.ts';
 import { processorTime } from '../support/processor.ts';
 import { REPOSITORY } from '../support/python.ts';
@@ -36,7 +37,7 @@ export async function compare(folder: string, script: string): Promise<Compariso
   await pages.listen();
   const browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
   const { page } = browser;
-  await browser.open(pages.resolvedUrls!.local[0]!);
+  await browser.open(drawnBy('webgl', pages.resolvedUrls!.local[0]!));
   await lookAsBundled(page, folder);
   await page.evaluate(() => window.ico3d!.stage.still());
   await page.addScriptTag({ type: 'module', url: `/bench/page/${script}` });

@@ -7,16 +7,15 @@ import { expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { pauseDrawing } from '../support/browser/drawing.ts';
 import { runPython } from '../support/python.ts';
-import { readRecord, recordLoudness, recordWire, type Record } from '../support/browser/recorder.ts';
+import { readRecord, recordLoudness, recordWire } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 import { quantile } from '../support/statistics.ts';
-import { VOICE } from '../support/browser/talk.ts';
+import { turnsOf, type Turn } from '../support/browser/turns.ts';
 
 const TURNS = 20;
 const PAUSE = 9; // s for the answer
 const QUESTIONS = ['who are you', 'what is your name', 'where do you live', 'how old are you'];
-const AUDIBLE = 1e-3; // level of the avatar
 
 test(`voice to voice over ${TURNS} turns`, async () => {
   const folder = scratchFolder();
@@ -33,7 +32,7 @@ test(`voice to voice over ${TURNS} turns`, async () => {
   await pauseDrawing(browser.page);
   await browser.page.click('#microphone');
   await browser.page.waitForTimeout(1000 * (8 + TURNS * (PAUSE + 1.2)));
-  const turns = turnsOf(await readRecord(browser.page));
+  const turns = turnsOf(await readRecord(browser.page)).map(({ parts }) => parts);
   await browser.close();
   await server.stop();
 
@@ -41,28 +40,7 @@ test(`voice to voice over ${TURNS} turns`, async () => {
   expect(turns.length).toBeGreaterThan(0.8 * TURNS);
 });
 
-/** Milliseconds by part. */
-type Turn = { [part: string]: number };
-
-function turnsOf(record: Record): Turn[] {
-  const starts = record.received.filter((m) => m.type === 'speech' && m.first_sample === 0);
-  return starts.slice(1).flatMap((speech) => {
-    const asked = record.microphone.findLast(({ at, level }) => at < speech.at && level > VOICE);
-    const sound = record.loudness.find(({ at, level }) => at > speech.at && level > AUDIBLE);
-    const server = record.received.find((m) => m.type === 'metrics' && m.name === 'turn' && m.at >= speech.at);
-    if (!asked || !sound) return [];
-    return [
-      {
-        ...(server?.values as Turn),
-        'question’s end to speech message': speech.at - asked.at,
-        'speech message to sound': sound.at - speech.at,
-        'voice to voice': sound.at - asked.at,
-      },
-    ];
-  });
-}
-
-function print(turns: Turn[]): void {
+function print(turns: Turn['parts'][]): void {
   const parts = [...new Set(turns.flatMap(Object.keys))];
   const rows = parts.map((part) => {
     const values = turns.map((turn) => turn[part]!).filter(Number.isFinite);

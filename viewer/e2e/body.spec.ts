@@ -3,6 +3,7 @@ import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { makeBody } from '../support/references/body.ts';
 import type { Playback } from '../src/motion/playback.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { psnr, takePixels, worst } from '../support/browser/pictures.ts';
 import { ChatServer } from '../support/servers/server.ts';
 
@@ -37,7 +38,7 @@ let page: Page;
 beforeAll(async () => {
   server = await ChatServer.start(reference.file);
   browser = await Browser.launch({ width: WIDTH, height: HEIGHT, hertz: 60 });
-  page = await browser.open(server.url);
+  page = await browser.open(drawnBy('webgl', server.url));
 });
 
 afterAll(async () => {

@@ -1,6 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { psnr, takePixels } from '../support/browser/pictures.ts';
 import { makePerson } from '../support/references/person.ts';
 import { servePage } from '../support/servers/static.ts';
@@ -24,7 +25,7 @@ beforeAll(async () => {
     await held;
     await route.continue();
   });
-  await browser.open(site.url);
+  await browser.open(drawnBy('webgl', site.url));
   await page.evaluate(() => window.ico3d!.stage.still());
 });
 

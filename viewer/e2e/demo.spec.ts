@@ -9,7 +9,7 @@ describe.skipIf(!demoUrl)('the packaged demo (needs src/ico3d/chat/data/demo.ico
   let browser: Browser;
 
   beforeAll(async () => {
-    browser = await openPage(demoUrl!, { calm: true });
+    browser = await openPage(demoUrl!, { calm: true }, 'webgl');
   });
 
   afterAll(() => browser?.close());

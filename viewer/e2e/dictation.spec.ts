@@ -3,6 +3,7 @@ import { join } from 'node:path';
 import { afterAll, beforeAll, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { drawSeldom } from '../support/browser/drawing.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
@@ -23,7 +24,7 @@ afterAll(() => server?.stop());
 async function talk(script: () => void): Promise<Browser> {
   const browser = await Browser.launch({ microphone: voice });
   await browser.context.addInitScript(script);
-  const page = await browser.open(server.url);
+  const page = await browser.open(drawnBy('soft', server.url));
   await drawSeldom(page);
   await page.waitForFunction(
     () => document.getElementById('answer')!.textContent === 'Hello.' && document.body.dataset.state === 'idle',

@@ -3,6 +3,7 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { drawn, enter, plugIn, seen } from '../support/browser/headset.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { servePage } from '../support/servers/static.ts';
@@ -21,7 +22,7 @@ beforeAll(() => void runPython('sound/voice.py', silence, '30'));
 async function open(url: string): Promise<Browser> {
   const browser = await Browser.launch({ width: WIDTH, height: HEIGHT, microphone: silence });
   await plugIn(browser.page);
-  await browser.open(url);
+  await browser.open(drawnBy('webgl', url));
   await browser.page.evaluate(() => {
     for (const { position } of Object.values(window.headset.controllers)) position.set(0.3, 1, 3); // not in the picture
   });

@@ -24,7 +24,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     server = await ChatServer.start(hasClip ? makePortrait(folder) : makeStandIn(folder, inject('shared').demo));
     const voice = join(folder, 'voice.wav');
     makeVoice(voice);
-    browser = await openPage(server.url, { microphone: voice, calm: true });
+    browser = await openPage(server.url, { microphone: voice, calm: true }, 'webgl');
     await until(browser, finished(0), 30_000); // the greeting
     await browser.page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null);
     await browser.page.waitForTimeout(EASED + 300);

@@ -1,5 +1,6 @@
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { slowNetwork, type Wire } from '../support/browser/wire.ts';
 import { slowness } from '../support/slowness.ts';
 
@@ -16,7 +17,7 @@ async function visit(browser: Browser): Promise<[named: number, drawn: number]> 
   const { page } = browser;
   const begun = performance.now();
   const since = () => (performance.now() - begun) / 1000;
-  await page.goto(demoUrl!, { waitUntil: 'commit' });
+  await page.goto(drawnBy('webgl', demoUrl!), { waitUntil: 'commit' });
   await page.waitForFunction(() => document.getElementById('name')?.textContent, undefined, { timeout: 60_000 });
   const named = since();
   await page.waitForFunction(() => (window.ico3d?.stage.frames ?? 0) > 0, undefined, { timeout: 60_000 });

@@ -4,6 +4,7 @@ import { Browser } from '../support/browser/browser.ts';
 import { drawSeldom, refreshed, stillPerson } from '../support/browser/drawing.ts';
 import { feed, noise } from '../support/sound/feeder.ts';
 import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/references/person.ts';
+import { drawnBy, type Path } from '../support/browser/path.ts';
 import { finished, openPage, SHORTER, until } from '../support/browser/talk.ts';
 import { crop, lookAsBundled, psnr, takePixels } from '../support/browser/pictures.ts';
 import { ChatServer } from '../support/servers/server.ts';
@@ -23,9 +24,9 @@ let server: Awaited<ReturnType<typeof servePage>>;
 let browser: Browser;
 let page: Page;
 
-async function open(calm = false): Promise<void> {
+async function open(path: Path, calm = false): Promise<void> {
   browser = await Browser.launch({ width: WIDTH, height: HEIGHT, calm });
-  page = await browser.open(server.url);
+  page = await browser.open(drawnBy(path, server.url));
 }
 
 /** Gives the page an utterance of noise, and what the server would plan for its beginning. */
@@ -42,12 +43,8 @@ const shows = (time: number) =>
 beforeAll(async () => (server = await servePage(person.folder)));
 afterAll(() => server?.close());
 
-describe('a whole person', () => {
-  beforeAll(() => open());
-  beforeEach(async () => {
-    await page.reload();
-    await page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
-  });
+describe('what WebGL draws of a whole person', () => {
+  beforeAll(() => open('webgl'));
   afterAll(() => browser?.close());
 
   test('stands in the page as Python draws it, head and body sorted as one', async () => {
@@ -69,6 +66,15 @@ describe('a whole person', () => {
       expect(asPainted).toBeLessThan(asRight! - 5);
     }
   });
+});
+
+describe('a whole person', () => {
+  beforeAll(() => open('soft'));
+  beforeEach(async () => {
+    await page.reload();
+    await page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
+  });
+  afterAll(() => browser?.close());
 
   test('idles in its rest span, and the head follows the body', async () => {
     await watchSteps(page);
@@ -111,7 +117,7 @@ describe('a whole person', () => {
 
   test('is met face to face on a phone, and can be seen from all around', async () => {
     await page.setViewportSize({ width: 195, height: 422 });
-    await page.waitForFunction(() => window.ico3d!.stage.renderer.domElement.height === 422);
+    await page.waitForFunction(() => window.ico3d!.stage.painter.pixels[1] === 422);
     await refreshed(page);
     await drawSeldom(page); // the camera tells where the visitor looks from
     const eyes = await page.evaluate(async () => {
@@ -130,7 +136,7 @@ describe('a whole person', () => {
 });
 
 describe('a visitor who wants little motion', () => {
-  beforeAll(() => open(true));
+  beforeAll(() => open('soft', true));
   afterAll(() => browser?.close());
 
   test('sees the body stand where the rest ends, and the face talk', async () => {

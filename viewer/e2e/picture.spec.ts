@@ -1,5 +1,6 @@
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { lookAsBundled, psnr, takeStill, worst } from '../support/browser/pictures.ts';
 import { makeReference } from '../support/references/head.ts';
 import { servePage } from '../support/servers/static.ts';
@@ -17,7 +18,7 @@ describe('what the GPU makes of a bundle', () => {
   beforeAll(async () => {
     server = await servePage(reference.folder);
     browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
-    await lookAsBundled(await browser.open(server.url), reference.folder);
+    await lookAsBundled(await browser.open(drawnBy('webgl', server.url)), reference.folder);
   });
 
   afterAll(async () => {

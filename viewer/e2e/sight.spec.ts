@@ -3,6 +3,7 @@ import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { drawSeldom, hideBody, refreshed } from '../support/browser/drawing.ts';
 import { seeChin, seeEyes } from '../support/browser/eyes.ts';
+import { drawnBy } from '../support/browser/path.ts';
 
 const MOST_SCRIPT = 1.2e6; // bytes on the wire until she is seen
 
@@ -27,7 +28,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
       if (answer) sent.push({ ...answer, bytes });
     });
     await network.send('Network.enable');
-    await browser.open(demoUrl!);
+    await browser.open(drawnBy('webgl', demoUrl!));
   });
 
   afterAll(() => browser?.close());
@@ -54,7 +55,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     expect(bytes).toBeGreaterThan(1e5);
     expect(bytes).toBeLessThan(MOST_SCRIPT);
     sent.length = 0;
-    await browser.open(demoUrl!);
+    await browser.open(drawnBy('webgl', demoUrl!));
     await drawSeldom(page);
     await hideBody(page);
     const assets = sent.filter(({ url }) => url.includes('/assets/')).map(({ bytes }) => bytes);

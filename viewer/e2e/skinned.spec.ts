@@ -1,12 +1,21 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import type { mountAvatar } from '../src/embed/api.ts';
 import type { Playback } from '../src/motion/playback.ts';
+import type { Presence } from '../src/visit.ts';
 import { Browser } from '../support/browser/browser.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { lookAsBundled, psnr, takePixels, worst } from '../support/browser/pictures.ts';
 import { makePerson } from '../support/references/person.ts';
 import { makeSkinned, type SkinnedMoment } from '../support/references/skinned.ts';
 import { ChatServer } from '../support/servers/server.ts';
 import { servePage } from '../support/servers/static.ts';
+
+declare global {
+  interface Window {
+    mountAvatar: typeof mountAvatar;
+  }
+}
 
 const WIDTH = 120;
 const HEIGHT = 160;
@@ -25,7 +34,7 @@ let page: Page;
 beforeAll(async () => {
   server = await ChatServer.start(reference.file);
   browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
-  page = await browser.open(server.url);
+  page = await browser.open(drawnBy('webgl', server.url));
 });
 
 afterAll(async () => {
@@ -88,6 +97,36 @@ describe('a body on a skeleton alone, served by ico3d serve', () => {
     await expectAsInPython(reference.moments[1]!, 1);
   });
 
+  test('mounted by itself it takes the same pose, goes on with the recording, and refuses a pose of others', async () => {
+    await strike();
+    await page.evaluate("import(new URL('embed.js', location.href)).then(({ mountAvatar }) => void Object.assign(window, { mountAvatar }))");
+    const seen = await page.evaluate(async ({ rotations, root }) => {
+      const place = document.body.appendChild(document.createElement('div'));
+      place.style.cssText = 'position: fixed; width: 40px; height: 40px';
+      const handle = await window.mountAvatar(place, { bundle: 'bundle', calm: true });
+      const { skinned } = (handle as unknown as { cast: Pick<Presence, 'skinned'> }).cast;
+      const pose = { rotations: Array.from({ length: rotations.length / 4 }, (_, i) => rotations.slice(4 * i, 4 * i + 4)), root };
+      const before = [...skinned!.points];
+      handle.pose(pose as Parameters<typeof handle.pose>[0]);
+      const posed = [...skinned!.points];
+      let refusal = '';
+      try {
+        handle.pose({ rotations: [], root: [0, 0, 0] });
+      } catch (error) {
+        refusal = (error as Error).message;
+      }
+      handle.pose(null);
+      const after = [...skinned!.points];
+      handle.dispose();
+      place.remove();
+      return { before, posed, after, refusal, wanted: [...window.ico3d!.skinned!.points] };
+    }, { rotations: [...unseen.rotations], root: [...unseen.root] as [number, number, number] });
+    expect(worst(seen.posed, seen.wanted)).toBeLessThan(1e-6);
+    expect(worst(seen.before, seen.wanted)).toBeGreaterThan(0.05);
+    expect(seen.after).toEqual(seen.before);
+    expect(seen.refusal).toMatch(/^A pose of this body has \d+ joints/);
+  });
+
   test('a damaged file is one sentence on the page', async () => {
     await page.route('**/body/skinned.safetensors*', (route) => route.fulfill({ body: 'x'.repeat(100) }));
     await page.reload();
@@ -104,7 +143,7 @@ describe('a whole person on a skeleton', () => {
 
   beforeAll(async () => {
     files = await servePage(whole.folder);
-    page = await browser.open(files.url);
+    page = await browser.open(drawnBy('webgl', files.url));
     await lookAsBundled(page, whole.folder);
   });
   afterAll(() => files?.close());

@@ -2,6 +2,7 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { drawSeldom, refreshed } from '../support/browser/drawing.ts';
+import { drawnBy } from '../support/browser/path.ts';
 import { psnr, takePixels } from '../support/browser/pictures.ts';
 import { makePerson } from '../support/references/person.ts';
 import { servePage } from '../support/servers/static.ts';
@@ -24,7 +25,7 @@ let page: Page;
 beforeAll(async () => {
   server = await servePage(makePerson({ gaussians: '300,450' }).folder);
   browser = await Browser.launch({ width: 160, height: 200, hertz: 60 });
-  page = await browser.open(server.url);
+  page = await browser.open(drawnBy('webgl', server.url));
 });
 
 afterAll(async () => {
@@ -230,7 +231,7 @@ test('thinned out, the backdrop’s largest splats stay; what stands still is ma
 });
 
 test('?bench measures each part and all of them, in two sizes', async () => {
-  await page.goto(`${server.url}?bench=0.01`);
+  await page.goto(drawnBy('webgl', `${server.url}?bench=0.01`));
   const table = page.locator('.bench');
   await expect.poll(() => table.textContent(), { timeout: 60_000 }).toContain('Done.');
   const rows = (await table.textContent())!.split('\n').filter((line) => / ms \|$/.test(line)).map((line) => line.split('|').map((cell) => cell.trim()));

@@ -48,7 +48,7 @@ export async function bench(presence: Presence, seconds = SECONDS): Promise<void
   text.className = 'bench';
   text.setAttribute('role', 'status');
   document.body.append(text);
-  const lines = [`${nameOf(stage.renderer.getContext())}, ${navigator.hardwareConcurrency} cores, ${new Date().toISOString().slice(0, 10)}`, '', ...HEADER];
+  const lines = [`${stage.painter.name}, ${navigator.hardwareConcurrency} cores, ${new Date().toISOString().slice(0, 10)}`, '', ...HEADER];
   const show = () => (text.textContent = lines.join('\n'));
   show();
   await measure(presence, seconds, (row) => {
@@ -59,12 +59,6 @@ export async function bench(presence: Presence, seconds = SECONDS): Promise<void
   show();
   console.log(text.textContent);
   stage.start();
-}
-
-/** What the GPU calls itself; browsers hide it behind an extension. */
-function nameOf(gl: WebGLRenderingContext | WebGL2RenderingContext): string {
-  const unmasked = gl.getExtension('WEBGL_debug_renderer_info');
-  return gl.getParameter(unmasked ? unmasked.UNMASKED_RENDERER_WEBGL : gl.RENDERER) as string;
 }
 
 const HEADER = [

@@ -14,7 +14,7 @@ import { Head, sway, type Carrier } from './head/head.ts';
 import { MotionDirector, type Spoken } from './motion/director.ts';
 import type { Motion } from './motion/motion.ts';
 import { Playback } from './motion/playback.ts';
-import { makeBackdrop } from './stage/backdrop.ts';
+import type { Path } from './soft/contract.ts';
 import type { Stage } from './stage/stage.ts';
 
 /** Who is on stage: a head, a body that plays, or a whole person whose body a director moves. */
@@ -42,7 +42,7 @@ export interface CastPorts {
  * @param calm the visitor wants little motion: only faces move
  */
 export async function makeCast(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
-  const backdrop = stage.transparent ? undefined : ((await makeBackdrop(files)) ?? undefined);
+  const backdrop = stage.transparent ? undefined : await makeBackdrop(files, stage.painter.path);
   if (backdrop) stage.add(backdrop);
   return { backdrop, ...(await makePeople(manifest, files, stage, calm, ports)) };
 }
@@ -53,6 +53,14 @@ export async function refine({ head: info, skinned: body }: Manifest, files: Bun
   if (skinned && body!.num_rest) {
     skinned.refine(readSkinnedRows(await files.tensors(SKINNED_REST), body!.num_rest, body!, SKINNED_REST));
   }
+}
+
+/** The splats behind the person, if there are some; Spark reads them where it draws, and kinds that nobody else reads. */
+async function makeBackdrop(files: BundleFiles, path: Path): Promise<Actor | undefined> {
+  const splats = await files.backdrop();
+  if (!splats) return undefined;
+  const still = path === 'soft' ? await (await import('./stage/backdrop/still.ts')).makeStillBackdrop(splats) : null;
+  return still ?? (await import('./stage/backdrop/spark.ts')).makeBackdrop(splats);
 }
 
 async function makePeople(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
@@ -157,7 +165,7 @@ function makeWindows(
     const window = info.windows[index]!;
     return readBakedWindow(await files.tensors(window.file), info, window);
   };
-  const body = new Body(info, new Timeline(info), motion, stage.painter, { load, failed });
+  const body = new Body(info, new Timeline(info), motion, stage, { load, failed });
   stage.add(body);
   return body;
 }

@@ -1,7 +1,7 @@
-import type { SplatGenerator } from '@sparkjsdev/spark';
+import type { Generator } from './gaussians/generator.ts';
 import './style.css';
 import { Server } from './server.ts';
-import { readSplats, type Splats } from './stage/readback.ts';
+import { readSplats, type Splats } from './stage/webgl/readback.ts';
 import { Visit, type Presence } from './visit.ts';
 import { PageWords } from './words/page-words.ts';
 import { xrSettings } from './xr/settings.ts';
@@ -11,13 +11,14 @@ declare global {
     /** For tests and for the curious: what the page is made of. */
     ico3d?: Presence & {
       visit: Visit;
-      splats: (generator: SplatGenerator) => Splats;
+      splats: (generator: Generator) => Splats;
     };
   }
 }
 
 const parameters = new URL(location.href).searchParams;
 const visit: Visit = new Visit(document.body, new Server(new URL(location.href)), {
+  draw: parameters.get('draw'),
   xr: xrSettings((name) => parameters.get(name)),
   words: new PageWords(document.documentElement),
   emit: () => {},

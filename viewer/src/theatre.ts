@@ -1,4 +1,4 @@
-/** What draws somebody, with three and Spark: a page that loads this by itself can be used before. */
+/** What brings somebody on stage: a page that loads this by itself can be used before. What draws is in `painters/`. */
 export { makeCast, refine } from './cast.ts';
 export { Stage } from './stage/stage.ts';
 export { makeViewBar } from './ui/views.ts';

@@ -1,14 +1,16 @@
 import type { Body } from './body/body.ts';
 import type { SkinnedBody } from './body/skinned/body.ts';
 import { BundleFiles, filesToFirstSight, loadManifest, THUMBNAIL } from './bundle/load.ts';
-import { blinkIndices, bodyOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
+import { blinkIndices, bodyOf, nameOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
 import type { Cast } from './cast.ts';
 import { PageError, sentenceOf } from './errors.ts';
 import { Face } from './face/face.ts';
 import { IdleFace } from './face/idle.ts';
 import { atEnd } from './lifetime.ts';
 import type { Server } from './server.ts';
-import { choosePainter } from './stage/choosing.ts';
+import { PAINTERS } from './painters/paths.ts';
+import { choosePath, rememberWish, wishOf, type Wish } from './stage/choosing.ts';
+import type { Drawing } from './stage/painting.ts';
 import type { Stage } from './stage/stage.ts';
 import { Conversation } from './talk/conversation.ts';
 import type { Emit } from './talk/events.ts';
@@ -18,10 +20,12 @@ import { byId, focusOn } from './ui/elements.ts';
 import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
+import { offerDrawing } from './ui/sheets/drawing.ts';
 import { makeThemeButton, showTheme } from './ui/theme.ts';
 import type { PageWords } from './words/page-words.ts';
 import { say, type Sentence } from './words/text.ts';
 import { offerXr } from './xr/offer.ts';
+import type { Path } from './soft/contract.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
 
 /** Who is there, once they can be seen. */
@@ -38,6 +42,8 @@ export interface VisitPorts {
   words: PageWords;
   /** The avatar alone is drawn, on what is behind the element. */
   transparent?: boolean;
+  /** What is to draw: `webgl`, `soft` or `auto`; null where that is the visitor's choice. */
+  draw?: string | null;
   /** How the visitor wants to talk, if it is known. */
   choice?: Choice;
   /** What headsets draw. */
@@ -66,6 +72,7 @@ export class Visit {
   private readonly calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
   private readonly ending = new AbortController();
   private readonly overlay: Overlay;
+  private redrawing = Promise.resolve(); // one after another
 
   /** @param root what holds the elements of `index.html` */
   constructor(root: HTMLElement, server: Server, ports: VisitPorts) {
@@ -89,20 +96,25 @@ export class Visit {
     const { signal } = this.ending;
     const coming = import('./theatre.ts'); // meanwhile the first files are asked for
     coming.catch(() => {}); // heard of below
-    const manifest = await loadManifest(server.file.bind(server), signal);
+    const told = loadManifest(server.file.bind(server), signal);
+    const wish = wishOf(this.ports.draw);
+    const drawing = drawingOf(wish);
+    drawing.catch(() => {}); // heard of below
+    const manifest = await told;
     const files = this.ask(manifest);
-    const name = manifest.persona.name || manifest.name;
+    const name = nameOf(manifest);
     byId(root, 'name').textContent = name;
     root.style.setProperty('--backdrop', cssColour(manifest.background));
-    this.overlay.greet(name, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
+    this.overlay.greet(manifest, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
     this.ports.named(name);
 
-    const painter = this.ports.transparent ? undefined : await choosePainter(new URL(location.href));
     const theatre = await coming;
     signal.throwIfAborted();
-    const stage = new theatre.Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent, painter);
+    const stage = new theatre.Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, await drawing, this.ports.transparent);
     atEnd(signal, () => stage.dispose());
-    stage.onGone = () => this.overlay.fail(say('error.picture'));
+    let offered = () => {}; // says anew what headsets may do
+    stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
+    root.dataset.path = stage.painter.path;
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
     const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '' }, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
@@ -113,7 +125,8 @@ export class Visit {
       theatre.makeViewBar(stage.orbit, words, root, signal),
     );
     const xr = { stage, conversation, head: presence.head, root, words, settings: this.ports.xr ?? xrSettings(() => null), signal };
-    if (!painter) void offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
+    offered = offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
+    offerDrawing(root, wish, (wish) => void this.redraw(stage, wish).then(offered));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
     if (moving && playback) new PlayerBar(root, words, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
@@ -122,6 +135,36 @@ export class Visit {
     this.overlay.hide();
     if (conversation) page.talk(conversation);
     else focusOn(byId(root, 'play'));
+  }
+
+  /** Something else is to draw from now on; the talk goes on. */
+  private redraw(stage: Stage, wish: Wish): Promise<void> {
+    rememberWish(wish);
+    const next = async () => {
+      const drawing = await drawingOf(wish);
+      if (!this.ending.signal.aborted && drawing.path !== stage.painter.path) await this.change(stage, drawing);
+    };
+    return (this.redrawing = this.redrawing.then(next).catch((error: unknown) => {
+      if (!this.ending.signal.aborted) showNotice(this.root, this.ports.words, sentenceOf(error));
+    }));
+  }
+
+  /** The browser took WebGL away: the processor draws from now on. */
+  private goOnWithoutWebGL(stage: Stage): Promise<void> {
+    const next = async () => {
+      const make = await PAINTERS.soft();
+      if (!this.ending.signal.aborted) await this.change(stage, { make, why: say('drawn.gone') });
+    };
+    return (this.redrawing = this.redrawing.then(next).catch((error: unknown) => {
+      if (this.ending.signal.aborted) return;
+      console.error(error);
+      this.overlay.fail(say('error.picture'));
+    }));
+  }
+
+  private async change(stage: Stage, drawing: Drawing): Promise<void> {
+    await stage.redraw(drawing);
+    this.root.dataset.path = stage.painter.path;
   }
 
   private converse(page: Page): Conversation {
@@ -186,6 +229,12 @@ export class Visit {
     this.overlay.fail(sentenceOf(error));
     this.ports.failed?.(sentenceOf(error));
   }
+}
+
+/** What draws by a wish. */
+async function drawingOf(wish: Wish): Promise<Drawing & { path: Path }> {
+  const { path, why } = choosePath(wish);
+  return { path, why, make: await PAINTERS[path]() };
 }
 
 function makeFace(info: HeadInfo, conversation: Conversation): Face {

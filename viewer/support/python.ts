@@ -1,4 +1,5 @@
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawn } from 'node:child_process';
+import { once } from 'node:events';
 import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
@@ -6,6 +7,8 @@ export const REPOSITORY = fileURLToPath(new URL('../../', import.meta.url));
 
 /** The Python that has ico3d: $ICO3D_PYTHON, or the checkout's own. */
 export const PYTHON = process.env.ICO3D_PYTHON ?? `${REPOSITORY}.venv/bin/python`;
+
+const FORKS = `${REPOSITORY}viewer/support/forks.py`;
 
 if (!existsSync(PYTHON)) throw new Error(`no Python at ${PYTHON}: run make install or set ICO3D_PYTHON`);
 
@@ -20,6 +23,20 @@ export const ENVIRONMENT = {
   NUMBA_NUM_THREADS: '1',
   PYTHONPATH: `${REPOSITORY}src:${REPOSITORY}tests`,
 };
+
+/** Runs forks (`forks.py`) at an address until the function that it gives is called, or this process ends. */
+export async function startForks(address: string): Promise<() => void> {
+  const forks = spawn(PYTHON, [FORKS, address], { cwd: REPOSITORY, env: ENVIRONMENT, stdio: ['pipe', 'pipe', 'inherit'] });
+  await once(forks.stdout, 'data'); // it is ready
+  process.env.ICO3D_FORKS = address; // workers inherit it
+  return () => forks.stdin.end();
+}
+
+/** Runs a script of `support/` that imports torch to its end, in a fork of a process that has imported it. */
+export function runFork(script: string, ...args: string[]): void {
+  const words = ['-I', '-S', FORKS, process.env.ICO3D_FORKS!, `${REPOSITORY}viewer/support/${script}`, ...args];
+  execFileSync(PYTHON, words, { stdio: ['ignore', 'ignore', 'inherit'] });
+}
 
 /** Runs a script as Python does, without looking for garbage: what is imported, which takes longest, stays. */
 const WITHOUT_COLLECTING = `import gc, os, runpy, sys

@@ -21,7 +21,7 @@ const ORDER = [
   ['gesture'],
   ['body', 'stage', 'audio'],
   ['talk'],
-  ['ui', 'cast.ts'],
+  ['ui', 'cast.ts', 'painters'],
   ['xr', 'theatre.ts'],
   ['visit.ts', 'check'],
   ['bench.ts'],

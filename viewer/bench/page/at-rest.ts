@@ -1,10 +1,11 @@
 /** In the page: splats at rest, to compare those that move with. */
-import { dyno, ExtSplats, SplatMesh, type SplatGenerator } from '@sparkjsdev/spark';
-import { readTexels } from '../../src/stage/readback.ts';
+import { dyno, ExtSplats, SplatMesh } from '@sparkjsdev/spark';
+import type { Generator } from '../../src/gaussians/generator.ts';
+import { readTexels } from '../../src/stage/webgl/readback.ts';
 import type { Stage } from '../../src/stage/stage.ts';
 
 /** What generators made for the picture that was drawn last, as splats that go through an identity modifier; not yet visible. */
-export async function putToRest(stage: Stage, generators: SplatGenerator[]): Promise<SplatMesh> {
+export async function putToRest(stage: Stage, generators: Generator[]): Promise<SplatMesh> {
   const mesh = new SplatMesh({
     constructSplats: (splats) => {
       for (const generator of generators) {

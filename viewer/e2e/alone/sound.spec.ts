@@ -1,6 +1,7 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
 import { feed, noise } from '../../support/sound/feeder.ts';
+import { drawnBy } from '../../support/browser/path.ts';
 import { lookAsBundled } from '../../support/browser/pictures.ts';
 import { runPython } from '../../support/python.ts';
 import { scratchFolder } from '../../support/scratch.ts';
@@ -21,7 +22,7 @@ beforeAll(async () => {
   runPython('references/phase_bundle.py', folder);
   server = await servePage(folder);
   browser = await Browser.launch({ width: SIZE, height: SIZE });
-  await lookAsBundled(await browser.open(server.url), folder);
+  await lookAsBundled(await browser.open(drawnBy('webgl', server.url)), folder);
   await browser.page.evaluate(`window.noise = ${noise.toString()}`);
   await tap(browser.page);
   await watch();

@@ -28,7 +28,7 @@ declare global {
 
 const EXAMPLE = readFileSync(join(REPOSITORY, 'examples/embedding/index.html'), 'utf8');
 const BOARD = 'background: conic-gradient(#fff 25%, #000 0 50%, #fff 0 75%, #000 0) 0 0 / 16px 16px';
-const EVENTS = ['ready', 'state', 'user-transcript', 'avatar-transcript', 'speak-start', 'speak-end', 'error'];
+const EVENTS = ['ready', 'state', 'user-transcript', 'avatar-transcript', 'speak-start', 'speak-end', 'gesture', 'tool-call', 'error'];
 const READY_WITHIN = 20_000; // ms
 
 let server: ChatServer;
@@ -40,10 +40,13 @@ function pageOf(path: string): string {
   const own: Record<string, string> = {
     '/example': example,
     '/inline': example.replace(/<ico3d-avatar.*>/, '<ico3d-avatar autoconnect style="width: 320px; height: 240px"></ico3d-avatar>'),
-    '/clear': example.replace(/<ico3d-avatar.*>/, `<ico3d-avatar transparent autoconnect style="width: 320px; height: 240px; ${BOARD}"></ico3d-avatar>`),
+    '/clear': example.replace(/<ico3d-avatar.*>/, `<ico3d-avatar transparent draw="webgl" autoconnect style="width: 320px; height: 240px; ${BOARD}"></ico3d-avatar>`),
+    '/soft': example.replace(/<ico3d-avatar.*>/, `<ico3d-avatar transparent autoconnect style="width: 320px; height: 240px; ${BOARD}"></ico3d-avatar>`),
     '/french': `<!doctype html><html lang="de"><title>Site</title><main><h1>Site</h1>
       <ico3d-avatar lang="fr" style="max-width: 100%"></ico3d-avatar><ico3d-avatar mode="floating"></ico3d-avatar></main>
       <script type="module" src="${server.url}embed.js"></script></html>`,
+    '/two': example.replace(/<ico3d-avatar.*>/, '<ico3d-avatar autoconnect style="width: 160px; height: 160px"></ico3d-avatar>'.repeat(2)),
+    '/framed': `<iframe src="${server.url}check" width="400" height="340"></iframe>`,
     '/alone': `<div id="place" style="width: 160px; height: 160px"></div>
       <script type="module">
         import { mountAvatar } from '${server.url}embed.js';
@@ -131,6 +134,26 @@ describe('an avatar in the page of another origin', () => {
     expect(refusal).toMatch(/^This avatar cannot be entered/);
   });
 
+  test('tells of gestures and of functions that are called, and has a volume', async () => {
+    const cue = { name: 'wave', mirror: false, begin: 0.5, stroke: 0.9, end: 1.4 };
+    const levels = await page.evaluate((cue) => {
+      const say = (message: object) => window.sockets[0]!.onmessage!(new MessageEvent('message', { data: JSON.stringify(message) }));
+      say({ type: 'cues', utterance: 9, cues: [cue], releases: [] });
+      say({ type: 'call', name: 'open_door', arguments: '{"side": "left"}' });
+      const avatar = document.querySelector('ico3d-avatar')!;
+      const { output } = (avatar as unknown as { talk: { presence: Presence } }).talk.presence.conversation!.player;
+      return [0.25, 7, -1].map((volume) => {
+        avatar.setVolume(volume);
+        return output.gain.value;
+      });
+    }, cue);
+    expect(levels).toEqual([0.25, 1, 0]);
+    await heard(page, 'gesture', { utterance: 9, name: 'wave', mirror: false, begin: 0.5, stroke: 0.9 });
+    await heard(page, 'tool-call', { name: 'open_door' });
+    const call = await page.evaluate(() => window.told.find(({ type }) => type === 'tool-call')!.detail.arguments);
+    expect(call).toEqual({ side: 'left' });
+  });
+
   test('leaves the page around it as it was, and nothing behind', async () => {
     const before = await page.evaluate(() => ({
       title: document.title,
@@ -150,6 +173,31 @@ describe('an avatar in the page of another origin', () => {
     expect(await stranger.page.evaluate(() => customElements.get('ico3d-avatar') === undefined)).toBe(true);
     await stranger.browser.close();
   });
+});
+
+test('two on one page have a talk each, and one stays when the other goes', async () => {
+  const { browser, page } = await visit('/two');
+  await page.waitForFunction(() => window.told.filter(({ type }) => type === 'ready').length === 2, undefined, { timeout: 2 * READY_WITHIN });
+  const asked = await page.evaluate(() => {
+    const from: number[] = [];
+    const avatars = [...document.querySelectorAll('ico3d-avatar')];
+    for (const [i, avatar] of avatars.entries()) avatar.addEventListener('user-transcript', () => from.push(i));
+    avatars[1]!.send('Who are you?');
+    avatars[0]!.remove();
+    return { from, sent: avatars.map((avatar) => avatar.send('Who are you?')) };
+  });
+  expect(asked).toEqual({ from: [1, 1], sent: [false, true] });
+  await heard(page, 'avatar-transcript', { text: 'I am Stella.' });
+  expect(await page.evaluate(() => window.contexts.map(({ state }) => state).sort())).toEqual(['closed', 'running']);
+  await browser.close();
+});
+
+test('in a frame that is not given the microphone, the page says so', async () => {
+  const { browser, page } = await visit('/framed');
+  const microphone = page.frameLocator('iframe').locator('#microphone');
+  await microphone.locator('button').click();
+  await expect.poll(() => microphone.locator('.words').textContent()).toMatch(/^The site around this page does not give it the microphone/);
+  await browser.close();
 });
 
 test('the floating one is worked with the keyboard alone', async () => {
@@ -217,6 +265,28 @@ test('around a transparent one the page is seen, through the edges of Gaussians 
     expect(most).toBeLessThanOrEqual(10); // levels: what many layers round away
     expect(mean).toBeLessThan(0.5);
   }
+  await browser.close();
+});
+
+test('around a transparent one that the processor draws the page is seen, too', async () => {
+  const { browser, page } = await visit('/soft');
+  await heard(page, 'ready');
+  const drawn = await page.evaluate(async () => {
+    const avatar = document.querySelector('ico3d-avatar')! as unknown as { talk: { presence: Presence } };
+    const { stage } = avatar.talk.presence;
+    await stage.still();
+    const canvas = document.querySelector('ico3d-avatar')!.shadowRoot!.querySelector<HTMLCanvasElement>('#stage')!;
+    const { data } = canvas.getContext('2d')!.getImageData(0, 0, canvas.width, canvas.height);
+    const alphas = data.filter((_, i) => i % 4 === 3);
+    const share = (test: (alpha: number) => boolean) => alphas.filter(test).length / alphas.length;
+    const scripts = performance.getEntriesByType('resource').filter(({ name }) => /assets\/(spark|three-webgl)-/.test(name));
+    return { path: stage.painter.path, corner: alphas[0], empty: share((a) => a === 0), edge: share((a) => a > 25 && a < 230), shared: crossOriginIsolated, scripts: scripts.length };
+  });
+  expect(drawn).toMatchObject({ path: 'soft', corner: 0, shared: false, scripts: 0 });
+  expect(drawn.empty).toBeGreaterThan(0.05);
+  expect(drawn.edge).toBeGreaterThan(0.01);
+  const refusal = await page.evaluate(() => document.querySelector('ico3d-avatar')!.enterXR().catch((error: Error) => error.message));
+  expect(refusal).toMatch(/^This avatar cannot be entered/);
   await browser.close();
 });
 

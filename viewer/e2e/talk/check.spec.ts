@@ -1,6 +1,7 @@
 import { join } from 'node:path';
 import { afterEach, beforeAll, expect, inject, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
+import { CARD, pretendCard } from '../../support/browser/path.ts';
 import { runPython } from '../../support/python.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 
@@ -20,6 +21,7 @@ async function check(microphone?: string): Promise<string[]> {
   browser = await Browser.launch({ width: 390, height: 844, microphone });
   const scripts: string[] = [];
   browser.page.on('response', (response) => response.url().endsWith('.js') && scripts.push(response.url()));
+  await pretendCard(browser.context);
   await browser.page.goto(`${talkingUrl}check`);
   for (const id of ['secure', 'graphics', 'frames', 'socket', 'headset']) await judged(id);
   return scripts;
@@ -30,7 +32,7 @@ test('each line says what is so; microphone and sound are tried, and the report 
   const { page } = browser;
   expect(await verdict('secure')).toBe('good');
   expect(await page.evaluate(() => document.elementFromPoint(60, 200)!.closest('main, body')!.tagName)).toBe('MAIN'); // seen, not only there
-  expect([await verdict('graphics'), await words('graphics')]).toEqual(['fair', expect.stringMatching(/SwiftShader|llvmpipe/)]);
+  expect([await verdict('graphics'), await words('graphics')]).toEqual(['good', `WebGL 2, drawn by ${CARD}.`]);
   expect(await words('frames')).toMatch(/^\d+ frames? per second/);
   expect(await words('socket')).toMatch(/^The server answers within [\d.]+ ms/);
   expect(['none', 'good']).toContain(await verdict('headset'));
@@ -66,10 +68,20 @@ test('a refused microphone and a server that is gone are told, with what to do',
   const { page } = browser;
   await page.routeWebSocket(/echo$/, (socket) => socket.close());
   await page.addInitScript(() => {
+    Object.defineProperty(window, 'localStorage', {
+      get() {
+        throw new DOMException('refused', 'SecurityError'); // as where all that pages keep is blocked
+      },
+    });
     navigator.mediaDevices.getUserMedia = () => Promise.reject(new DOMException('refused', 'NotAllowedError'));
   });
   await page.goto(`${talkingUrl}check`);
   await judged('socket');
+  await page.selectOption('#language', 'de'); // kept nowhere
+  expect(await page.textContent('h1')).toBe('Dieses Gerät prüfen');
+  await page.selectOption('#language', 'en');
+  expect([await verdict('graphics'), await words('graphics')]).toEqual(['fair', expect.stringMatching(/^The processor draws.*(SwiftShader|llvmpipe)/)]);
+  expect([await verdict('frames'), await words('frames')]).toEqual(['none', 'Nothing to count: no graphics card draws.']);
   expect([await verdict('socket'), await page.textContent('#socket .advice')]).toEqual(['bad', expect.stringContaining('firewall')]);
   await page.click('#microphone button');
   await judged('microphone');

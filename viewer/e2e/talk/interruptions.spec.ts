@@ -2,6 +2,7 @@ import { join } from 'node:path';
 import { afterEach, beforeAll, expect, inject, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
+import { drawnBy } from '../../support/browser/path.ts';
 import { microphones, recordWire } from '../../support/browser/recorder.ts';
 import { until } from '../../support/browser/talk.ts';
 import { runPython } from '../../support/python.ts';
@@ -33,7 +34,7 @@ test('sound and microphone that the system takes away come back, and the screen 
       return lock;
     };
   });
-  await browser.open(talkingUrl);
+  await browser.open(drawnBy('soft', talkingUrl));
   await pauseDrawing(page);
   const sound = () => page.evaluate(() => window.ico3d!.conversation!.player.context.state);
   const opened = () => page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');

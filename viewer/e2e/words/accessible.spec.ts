@@ -1,26 +1,15 @@
-import type { Page, WebSocketRoute } from 'playwright-core';
+import type { WebSocketRoute } from 'playwright-core';
 import { afterEach, expect, inject, test } from 'vitest';
 import { judge } from '../../support/browser/axe.ts';
 import { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
+import { drawnBy } from '../../support/browser/path.ts';
+import { keepSound } from '../../support/browser/talk.ts';
 
 const { talkingUrl } = inject('shared');
 
 let browser: Browser;
 afterEach(() => browser?.close());
-
-/** Sound waits for a click, as in browsers that are not tested. */
-function keepSound(page: Page): Promise<unknown> {
-  return page.addInitScript(() => {
-    const state = Object.getOwnPropertyDescriptor(BaseAudioContext.prototype, 'state')!;
-    let clicked = false;
-    addEventListener('click', () => (clicked = true), { capture: true, once: true });
-    const get = function (this: AudioContext) {
-      return clicked ? state.get!.call(this) : 'suspended';
-    };
-    Object.defineProperty(AudioContext.prototype, 'state', { configurable: true, get });
-  });
-}
 
 test('axe finds nothing serious in any state of the page', async () => {
   browser = await Browser.launch({ width: 1280, height: 720, calm: true });
@@ -37,7 +26,7 @@ test('axe finds nothing serious in any state of the page', async () => {
     await loading;
     await route.continue();
   });
-  await page.goto(talkingUrl);
+  await page.goto(drawnBy('soft', talkingUrl));
   await page.waitForFunction(() => document.getElementById('overlay-name')!.textContent === 'Stella');
   await judge(page, 'loading');
   load();

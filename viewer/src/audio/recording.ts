@@ -121,8 +121,15 @@ async function askForMicrophone(): Promise<MediaStream> {
       audio: { channelCount: 1, echoCancellation: true, noiseSuppression: true, autoGainControl: true },
     });
   } catch (error) {
+    if (isKeptFromFrame()) throw new PageError(say('microphone.framed')); // whatever the browser found wrong besides
     throw new PageError(say(REASONS[(error as DOMException).name] ?? 'microphone.failed'));
   }
+}
+
+/** Whether this page is in a frame of another one that gives it no microphone; not all browsers tell. */
+function isKeptFromFrame(): boolean {
+  const { featurePolicy } = document as { featurePolicy?: { allowsFeature(name: string): boolean } };
+  return window.parent !== window && featurePolicy?.allowsFeature('microphone') === false;
 }
 
 const REASONS: Record<string, Key> = {

@@ -27,6 +27,7 @@ export class Body implements Actor {
   readonly motion: Motion;
   /** What the next picture shows of the body; null until its first window is loaded and sorted. */
   shown: Shown | null = null;
+  private readonly means: [Float32Array | null, Float32Array | null] = [null, null]; // of the windows in the slots
   private failure: unknown = null;
   private readonly timeline: Timeline;
   private readonly slots: Slots<PackedWindow>;
@@ -54,6 +55,11 @@ export class Body implements Actor {
     if (this.shown) motion.advance(step, this.shown);
     this.shown = this.slots.update(motion.time, motion.stops(), performance.now() / 1000);
     return SLOTS.map((slot) => this.pose(slot)).includes(true);
+  }
+
+  /** Of the window that is seen, where its Gaussians are on the whole. */
+  get points(): Float32Array | null {
+    return this.shown && this.means[this.shown.slot];
   }
 
   /** Time of the body that the picture shows, s. */
@@ -91,6 +97,7 @@ export class Body implements Actor {
 
   private put(slot: Slot, content: PackedWindow): void {
     this.objects[slot].hold(content);
+    this.means[slot] = content.means;
   }
 
   /**

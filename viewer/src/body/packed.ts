@@ -16,6 +16,7 @@ export interface Capacity {
 export interface PackedWindow {
   window: BakedWindow['info'];
   curve: Curve;
+  means: Float32Array; // (N,3) metres
   rest: Float32Array; // 2 layers of texels: centre with cluster, and scales
   colours: Uint8Array; // 1 layer of texels: red, green, blue, opacity
   basis: Int16Array; // 1 + P + R + L layers of texels: quaternion, basis of positions, of rotations, of scales
@@ -52,7 +53,7 @@ export function pack(window: BakedWindow, capacity: Capacity): PackedWindow {
     }
     begin += ranks[i]! * layer;
   });
-  return { window: window.info, curve: window.curve, rest, colours, basis };
+  return { window: window.info, curve: window.curve, means: window.means, rest, colours, basis };
 }
 
 /** Writes rows of 3 or 4 values into texels of 4, from `begin` on. */

@@ -1,8 +1,41 @@
-import { makeRows, ROW_BYTES, type Source } from '../soft/source.ts';
+import { makeRows, ROW_BYTES, type SoftObject, type Source } from '../soft/source.ts';
 import { coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
 
+/** A slot as it is now. */
+export interface SlotNow {
+  readonly content: PackedWindow | null;
+  readonly capacity: Capacity;
+  readonly coefficients: Float32Array;
+  readonly count: number; // Gaussians that take part in pictures
+  readonly unseen: boolean;
+}
+
+/** A slot for the processor's path. */
+export class SoftSlot implements SoftObject {
+  private readonly slot: SlotNow;
+  private packed: { content: PackedWindow; source: Source } | null = null;
+
+  constructor(slot: SlotNow) {
+    this.slot = slot;
+  }
+
+  get source(): Source | null {
+    const { content, capacity } = this.slot;
+    if (content && this.packed?.content !== content) this.packed = { content, source: softWindow(content, capacity) };
+    return content && this.packed!.source;
+  }
+
+  get drawn(): number {
+    return this.slot.unseen ? 0 : this.slot.count;
+  }
+
+  get values(): Float32Array {
+    return this.slot.coefficients;
+  }
+}
+
 /** A window in a slot for the processor's path. */
-export function softWindow({ window, rest, colours, basis }: PackedWindow, { width, rows: texelRows, ranks }: Capacity): Source {
+function softWindow({ window, rest, colours, basis }: PackedWindow, { width, rows: texelRows, ranks }: Capacity): Source {
   const count = window.num_gaussians;
   const layer = 4 * width * texelRows;
   const vectors = ranks[0] + ranks[1] + ranks[2];

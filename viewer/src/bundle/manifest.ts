@@ -183,6 +183,11 @@ export function bodyOf({ body, skinned }: Pick<Manifest, 'body' | 'skinned'>): A
   return skinned && { fps: skinned.fps, frames: skinned.num_frames, low: skinned.low, high: skinned.high };
 }
 
+/** What somebody is called. */
+export function nameOf({ persona, name }: Manifest): string {
+  return persona.name || name;
+}
+
 function isCount(value: unknown, most: number): boolean {
   return Number.isInteger(value) && (value as number) > 0 && (value as number) <= most;
 }

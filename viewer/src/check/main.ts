@@ -1,23 +1,28 @@
 import '../ui/style/page.css';
 import '../ui/style/buttons.css';
+import '../ui/style/theme.css';
 import './check.css';
 import { Server } from '../server.ts';
+import { seeGraphics } from '../soft/graphics.ts';
 import { byId } from '../ui/elements.ts';
 import { offerLanguages } from '../ui/sheets/languages.ts';
+import { followTheme } from '../ui/theme.ts';
 import { PageWords } from '../words/page-words.ts';
 import { say, type Message } from '../words/text.ts';
 import { report, summary, type Finding } from './finding.ts';
 import { checkHeadset } from './headset.ts';
 import { Line } from './lines.ts';
 import { checkSecurity, checkSocket } from './network.ts';
-import { checkFrames, checkGraphics } from './picture.ts';
+import { checkFrames, judgeGraphics } from './picture.ts';
 import { checkMicrophone, judgeTone, playTone } from './sound.ts';
 
 const LOUD = 0.3; // level at which the meter is full
 
 const findings = new Map<Message, Finding | null>();
 const words = new PageWords(document.documentElement);
-offerLanguages(byId(document, 'language'), words, new AbortController().signal);
+const { signal } = new AbortController(); // as long as the page is there
+offerLanguages(byId(document, 'language'), words, signal);
+followTheme(document.documentElement, () => {}, signal);
 const list = byId(document, 'lines');
 const text = byId<HTMLTextAreaElement>(document, 'report');
 
@@ -96,10 +101,11 @@ byId(document, 'copy').onclick = ({ target }) => {
 };
 
 security.found(checkSecurity());
-graphics.found(checkGraphics());
+const card = seeGraphics();
+graphics.found(judgeGraphics(card));
 const checks: [typeof frames, Promise<Finding>][] = [
   [headset, checkHeadset()],
   [socket, checkSocket(new Server(new URL(location.href)).echo())],
-  [frames, checkFrames()],
+  [frames, checkFrames(card)],
 ];
 for (const [{ found }, finding] of checks) void finding.then(found);

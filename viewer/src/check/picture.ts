@@ -1,7 +1,7 @@
+import type { Graphics } from '../soft/graphics.ts';
 import { say } from '../words/text.ts';
 import { bad, fair, good, none, type Finding } from './finding.ts';
 
-const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 const ACCELERATE = say('check.graphics.advice');
 const SPRITES = 20_000; // about as much to draw as the first sight of an avatar
 const SIDE = 480; // pixels
@@ -28,24 +28,16 @@ void main() {
   colour = vec4(0.9, 0.7, 0.5, 1.0) * alpha;
 }`;
 
-/** Whether there is WebGL 2, and who draws. */
-export function checkGraphics(): Finding {
-  const gl = document.createElement('canvas').getContext('webgl2');
-  if (!gl) return bad(say('check.graphics.none'), ACCELERATE);
-  const more = gl.getExtension('WEBGL_debug_renderer_info');
-  const name = String(gl.getParameter(more ? more.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-  gl.getExtension('WEBGL_lose_context')?.loseContext();
-  return judgeRenderer(name);
+/** @param graphics who draws WebGL 2; null where there is none */
+export function judgeGraphics(graphics: Graphics | null): Finding {
+  if (!graphics) return fair(say('check.graphics.none'), ACCELERATE);
+  const { name, software } = graphics;
+  return software ? fair(say('check.graphics.software', { name }), ACCELERATE) : good(say('check.graphics.good', { name }));
 }
 
-/** @param name how the browser calls who draws */
-export function judgeRenderer(name: string): Finding {
-  if (SOFTWARE.test(name)) return fair(say('check.graphics.software', { name }), ACCELERATE);
-  return good(say('check.graphics.good', { name }));
-}
-
-/** Draws soft sprites for a moment and counts. */
-export async function checkFrames(): Promise<Finding> {
+/** Draws soft sprites for a moment and counts, where WebGL draws avatars. */
+export async function checkFrames(graphics: Graphics | null): Promise<Finding> {
+  if (!graphics || graphics.software) return none(say('check.frames.none'));
   const canvas = document.createElement('canvas');
   canvas.width = canvas.height = SIDE;
   const gl = canvas.getContext('webgl2', { antialias: false });

@@ -28,6 +28,8 @@ interface Talk {
 /**
  * `<ico3d-avatar server="…" mode="inline|floating" transparent autoconnect>`: an avatar in somebody's page.
  *
+ * `draw` says what draws, `webgl` or `soft`; without it the browser decides, and the visitor.
+ *
  * `server` is the address of `ico3d serve`, by default that of this module; `avatar` a folder below it;
  * `token` or `token-url` admit the page where the server asks for it.
  */
@@ -147,7 +149,7 @@ export class AvatarElement extends HTMLElement {
     try {
       const server = await this.reach(signal);
       const manifest = await loadManifest((name) => server.file(name), signal);
-      overlay.greet(manifest.persona.name || manifest.name, server.file(THUMBNAIL));
+      overlay.greet(manifest, server.file(THUMBNAIL));
       const choice = await overlay.choose();
       if (!signal.aborted) this.begin(choice).catch(() => {}); // an event has told it
     } catch (error) {
@@ -219,6 +221,7 @@ export class AvatarElement extends HTMLElement {
       words: this.shell.words,
       transparent: this.hasAttribute('transparent'),
       choice,
+      draw: this.getAttribute('draw'),
       xr: xrSettings((name) => this.getAttribute(name)),
       emit,
       named: (given: string) => void (name = given),

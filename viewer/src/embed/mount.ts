@@ -1,11 +1,13 @@
 import { Player } from '../audio/player.ts';
 import { BundleFiles, loadManifest } from '../bundle/load.ts';
-import { blinkIndices, type HeadInfo, type Manifest } from '../bundle/manifest.ts';
+import { blinkIndices, nameOf, type HeadInfo, type Manifest } from '../bundle/manifest.ts';
 import { makeCast, refine, type Cast } from '../cast.ts';
 import { PageError } from '../errors.ts';
 import { Face } from '../face/face.ts';
 import { IdleFace } from '../face/idle.ts';
 import { EXPRESSION_FPS, SPEECH_RATE } from '../protocol.ts';
+import { PAINTERS } from '../painters/paths.ts';
+import { choosePath } from '../stage/choosing.ts';
 import { Stage } from '../stage/stage.ts';
 
 /** How an avatar is mounted. */
@@ -14,6 +16,8 @@ export interface MountOptions {
   bundle: string | URL;
   /** What is behind the element is seen around the avatar. */
   transparent?: boolean;
+  /** What draws: `webgl`, `soft` (the processor), or by default whichever is faster in this browser. */
+  draw?: 'auto' | 'webgl' | 'soft';
   /** Little motion: only the face moves. */
   calm?: boolean;
 }
@@ -54,13 +58,14 @@ export interface AvatarHandle {
 }
 
 /** Shows the avatar of a bundle in an element. */
-export async function mount(element: HTMLElement, { bundle, transparent = false, calm = false }: MountOptions): Promise<AvatarHandle> {
+export async function mount(element: HTMLElement, { bundle, transparent = false, draw = 'auto', calm = false }: MountOptions): Promise<AvatarHandle> {
   const folder = new URL(String(bundle).replace(/\/?$/, '/'), document.baseURI);
   const locate = (name: string, sha256?: string) => new URL(sha256 ? `${name}?sha256=${sha256}` : name, folder).href;
   const manifest = await loadManifest(locate);
-  const canvas = makeCanvas(manifest.persona.name || manifest.name);
+  const canvas = makeCanvas(nameOf(manifest));
   element.append(canvas);
-  const stage = new Stage(canvas, manifest, transparent);
+  const { path, why } = choosePath(draw);
+  const stage = new Stage(canvas, manifest, { make: await PAINTERS[path](), why }, transparent);
   const player = manifest.head ? new Player() : null;
   const mounted = new Mounted(stage, canvas, manifest.head ?? null, player);
   try {
@@ -147,6 +152,8 @@ class Mounted implements AvatarHandle {
 
   pose(pose: Pose | null): void {
     const { acting, skinned } = this.cast;
+    const joints = skinned?.generator.skeleton.rig.joints.length;
+    if (pose && joints !== undefined && pose.rotations.length !== joints) throw new PageError(`A pose of this body has ${joints} joints.`);
     if (acting) acting.held = pose;
     else if (pose) skinned?.strike(pose.rotations.flat(), pose.root);
     else skinned?.release();

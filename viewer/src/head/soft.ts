@@ -1,33 +1,38 @@
 import type { HeadRows } from '../bundle/baked-head.ts';
-import { joined, makeRows, ROW_BYTES, type SoftObject, type Source } from '../soft/source.ts';
+import { PackedParts } from '../soft/parts.ts';
+import { makeRows, ROW_BYTES, type Late, type SoftObject, type Source } from '../soft/source.ts';
+
+/** A head as it is now. */
+export interface HeadNow {
+  readonly parts: readonly HeadRows[];
+  readonly shown: Float32Array; // (K,) coefficients
+  readonly grown: number; // share of what came after the first part that is seen
+}
 
 /** A head for the processor's path. */
 export class SoftHead implements SoftObject {
-  drawn: number;
-  readonly values: Float32Array;
-  private readonly parts: HeadRows[];
-  private packed: Source | null = null;
+  private readonly head: HeadNow;
+  private readonly packed: PackedParts<HeadRows>;
 
-  /** @param values coefficients (K,) of the expression that is shown */
-  constructor(head: HeadRows, values: Float32Array) {
-    this.parts = [head];
-    this.drawn = head.count;
-    this.values = values;
+  constructor(head: HeadNow) {
+    this.head = head;
+    this.packed = new PackedParts(head.parts, pack);
   }
 
   get source(): Source {
-    return (this.packed ??= joined(this.parts.map(pack)));
+    return this.packed.source;
   }
 
-  /** Takes the Gaussians that come after the first ones; they are not seen until `show`. */
-  complete(rest: HeadRows): void {
-    this.parts.push(rest);
-    this.packed = null;
+  get drawn(): number {
+    return this.packed.drawn(this.head.grown);
   }
 
-  /** Draws what came later, too. */
-  show(): void {
-    this.drawn = this.parts.reduce((sum, { count }) => sum + count, 0);
+  get late(): Late {
+    return this.packed.late(this.head.grown);
+  }
+
+  get values(): Float32Array {
+    return this.head.shown;
   }
 }
 

@@ -1,7 +1,12 @@
 import type { PerspectiveCamera, Scene, Vector3 } from 'three';
 
-/** Draws what is on stage: Spark by the GPU (`stage/spark.ts`), or the processor alone (`painter.ts`). */
+/** What may draw: Spark by WebGL, or the processor alone. */
+export type Path = 'webgl' | 'soft';
+
+/** Draws what is on stage: Spark by the GPU (`stage/webgl/spark.ts`), or the processor alone (`painter.ts`). */
 export interface Painter {
+  readonly path: Path;
+  readonly name: string; // of what draws, as tables of measurements call it
   readonly pixels: [width: number, height: number]; // of the picture
   readonly gaussians: number; // drawn last
   readonly sorting: boolean;
@@ -11,12 +16,19 @@ export interface Painter {
   readonly busy: boolean;
   /** Whether what it draws with was taken away. */
   readonly lost: boolean;
+  /** Whether a picture at rest is drawn as fine as can be at once, whatever moving ones are. */
+  readonly refines: boolean;
   /** Whether somebody sees the pictures elsewhere than on the canvas. */
   readonly presenting: boolean;
   /** Calls a function before each refresh of the screen, with the time in ms; or none any more. */
   loop(frame: ((now: number) => void) | null): void;
-  /** Makes pictures of so many pixels on the page, times a ratio. */
-  fit(width: number, height: number, ratio: number): void;
+  /**
+   * Makes pictures for so many pixels on the page.
+   *
+   * @param ratio pixels of the screen for one of the page, along a side
+   * @param share of these that are drawn, along a side; the picture is enlarged to them
+   */
+  fit(width: number, height: number, ratio: number, share: number): void;
   /** @param immersed the picture is seen in a headset */
   paint(scene: Scene, camera: PerspectiveCamera, immersed: boolean): void;
   /** Resolves when nothing is missing for a picture as it should be. */
@@ -48,5 +60,15 @@ export interface Backcloth {
   colour(eye: Vector3, way: Vector3, out: Float32Array, at: number): void;
 }
 
-/** Makes a painter on a canvas. */
-export type MakePainter = (canvas: HTMLCanvasElement, background: readonly [number, number, number], backcloth: Backcloth | null, ports: PainterPorts) => Painter;
+/** What a painter paints on, and what. */
+export interface Easel {
+  canvas: HTMLCanvasElement;
+  scene: Scene;
+  background: readonly [number, number, number]; // display values
+  backcloth: Backcloth;
+  /** What is behind the canvas is seen around the avatar. */
+  transparent: boolean;
+}
+
+/** Makes a painter. */
+export type MakePainter = (easel: Easel, ports: PainterPorts) => Painter;

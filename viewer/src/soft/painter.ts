@@ -1,49 +1,58 @@
 import { Matrix4, Vector3, type Object3D, type PerspectiveCamera, type Scene } from 'three';
-import type { Backcloth, MakePainter, Painter } from './contract.ts';
-import type { Cloth, Drawn, Order } from './band.ts';
+import type { Easel, MakePainter, Painter } from './contract.ts';
+import type { Drawn, Order } from './band.ts';
 import { Bands } from './bands.ts';
-import type { Frame, Placed } from './rasteriser.ts';
+import type { Cloth, Frame, Placed, Steps } from './rasteriser.ts';
 import type { SoftObject, Source } from './source.ts';
 import { TILE_WIDTH } from './tiles.ts';
 import BandWorker from './worker.ts?worker&inline';
 
 const MOST_WORKERS = 4;
+const SHARPNESS = 0.13; // of a picture of full size; by 1/size more, which comes nearest to the fine picture
+const [SHARPNESS_STEPS, MOST_SHARPNESS] = [64, 31]; // as the kernel takes them
 const CLOTH_STEP = 8; // pixels
 
 /** Draws with the processor alone: workers draw bands of each picture, this thread only shows them. */
 class SoftPainter implements Painter {
+  readonly path = 'soft';
   pixels: [number, number] = [0, 0];
   gaussians = 0;
   sortTook = 0;
   lastSortTime = 0;
+  /** What the steps of the last picture took, ms: those of the slowest band, and showing it on this thread. */
+  steps: Steps & { show: number } = { project: 0, spread: 0, bin: 0, blend: 0, show: 0 };
   readonly sorting = false;
   readonly presenting = false;
   readonly lost = false;
+  readonly refines = true;
   private readonly context: CanvasRenderingContext2D;
-  private readonly background: readonly [number, number, number];
-  private readonly backcloth: Backcloth | null;
+  private readonly easel: Easel;
   private readonly workers: Worker[];
   private readonly bands: Bands;
   private readonly known = new Map<SoftObject, { id: number; source: Source | null }>();
   private clothKey = '';
+  private sharpness = 0; // 64ths
   private awaited = 0; // bands of the picture that is being drawn
   private drawn: Drawn[] = [];
   private frame: Omit<Frame, 'band'> | null = null;
-  private places: [first: number, end: number][] = [];
   private waiting: (() => void)[] = []; // those who wait for the picture
   private request = 0; // of an animation frame
 
-  constructor(...[canvas, background, backcloth]: Parameters<MakePainter>) {
-    this.context = canvas.getContext('2d', { alpha: false })!;
-    this.background = background;
-    this.backcloth = backcloth;
-    const count = Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1));
+  constructor(easel: Easel) {
+    this.context = easel.canvas.getContext('2d', { alpha: easel.transparent })!;
+    this.easel = easel;
+    // One core is left to this thread, to sound and to the conversation, which never wait for pictures.
+    const count = Math.max(1, Math.min(MOST_WORKERS, (navigator.hardwareConcurrency || 1) - 1));
     this.bands = new Bands(count);
     this.workers = Array.from({ length: count }, (_, i) => {
       const worker = new BandWorker();
       worker.onmessage = ({ data }: MessageEvent<Drawn>) => this.receive(i, data);
       return worker;
     });
+  }
+
+  get name(): string {
+    return `the processor alone, ${this.workers.length} threads`;
   }
 
   get busy(): boolean {
@@ -60,8 +69,10 @@ class SoftPainter implements Painter {
     this.request = requestAnimationFrame(next);
   }
 
-  fit(width: number, height: number, ratio: number): void {
-    this.pixels = [Math.max(1, Math.floor(width * ratio)), Math.max(1, Math.floor(height * ratio))];
+  fit(width: number, height: number, ratio: number, share: number): void {
+    this.pixels = [Math.max(1, Math.floor(width * ratio * share)), Math.max(1, Math.floor(height * ratio * share))];
+    // Sharpened edges would stand out against what is behind the page.
+    this.sharpness = share < 1 && !this.easel.transparent ? Math.min(MOST_SHARPNESS, Math.round((SHARPNESS_STEPS * SHARPNESS) / share)) : 0;
   }
 
   paint(scene: Scene, camera: PerspectiveCamera): void {
@@ -72,10 +83,9 @@ class SoftPainter implements Painter {
     const frame = { lens: lensOf(camera, width, height), width, height, placed: this.place(scene, camera) };
     const cloth = this.cloth(camera, width, height);
     this.frame = frame;
-    this.places = this.bands.of(Math.ceil(width / TILE_WIDTH));
     this.awaited = this.workers.length;
     this.lastSortTime = performance.now();
-    this.places.forEach((band, i) => this.tell(i, { frame: { ...frame, band }, cloth }));
+    this.bands.of(Math.ceil(width / TILE_WIDTH)).forEach((band, i) => this.tell(i, { frame: { ...frame, band }, cloth, sharpness: this.sharpness }));
   }
 
   async settle(): Promise<void> {
@@ -89,6 +99,7 @@ class SoftPainter implements Painter {
   dispose(): void {
     this.loop(null);
     for (const worker of this.workers) worker.terminate();
+    for (const resolve of this.waiting.splice(0)) resolve();
   }
 
   private tell(worker: number, order: Order): void {
@@ -103,7 +114,7 @@ class SoftPainter implements Painter {
       const { soft } = object;
       if (!soft?.source || soft.drawn === 0) return;
       const m = new Matrix4().multiplyMatrices(fromCamera, object.matrixWorld).transpose();
-      placed.push({ id: this.know(soft), view: Float32Array.from(m.elements.slice(0, 12)), drawn: soft.drawn, values: soft.values });
+      placed.push({ id: this.know(soft), view: Float32Array.from(m.elements.slice(0, 12)), drawn: soft.drawn, late: soft.late, values: soft.values });
     });
     return placed;
   }
@@ -120,19 +131,20 @@ class SoftPainter implements Painter {
 
   /** What is behind everybody as the camera sees it; null if it is as before. */
   private cloth(camera: PerspectiveCamera, width: number, height: number): Cloth | null {
-    const { backcloth } = this;
-    const shows = backcloth?.shows;
+    const { backcloth, background, transparent } = this.easel;
+    const { shows } = backcloth;
     const view = shows ? [...camera.matrixWorld.elements, ...camera.projectionMatrix.elements, backcloth.version] : [];
     const key = [width, height, ...view].join();
     if (key === this.clothKey) return null;
     this.clothKey = key;
     const columns = Math.ceil((width + TILE_WIDTH) / CLOTH_STEP) + 2;
     const rows = Math.ceil(height / CLOTH_STEP) + 2;
+    if (transparent) return { step: CLOTH_STEP, columns, colours: null };
     const colours = new Float32Array(3 * columns * rows);
     const [eye, way] = [new Vector3().setFromMatrixPosition(camera.matrixWorld), new Vector3()];
     for (let at = 0; at < colours.length; at += 3) {
       if (!shows) {
-        colours.set(this.background, at);
+        colours.set(background, at);
         continue;
       }
       const [column, row] = [(at / 3) % columns, Math.floor(at / 3 / columns)];
@@ -145,17 +157,20 @@ class SoftPainter implements Painter {
   private receive(worker: number, drawn: Drawn): void {
     this.drawn[worker] = drawn;
     if (--this.awaited > 0) return;
+    const before = performance.now();
     const { width, height } = this.frame!;
     const { canvas } = this.context;
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
-    this.places.forEach(([first, end], i) => {
-      if (end === first) return;
-      const pixels = new Uint8ClampedArray(this.drawn[i]!.pixels);
-      this.context.putImageData(new ImageData(pixels, TILE_WIDTH * (end - first), height), TILE_WIDTH * first, 0);
-    });
+    for (const { part, pixels } of this.drawn) {
+      if (!part) continue;
+      const { columns: [left, right], rows: [top, bottom] } = part;
+      this.context.putImageData(new ImageData(new Uint8ClampedArray(pixels), TILE_WIDTH * (right - left), bottom - top), TILE_WIDTH * left, top);
+    }
     this.gaussians = Math.max(...this.drawn.map(({ gaussians }) => gaussians));
-    this.sortTook = Math.max(...this.drawn.map(({ took }) => took));
+    const slowest = this.drawn.reduce((slow, one) => (one.took > slow.took ? one : slow));
+    this.sortTook = slowest.took;
+    this.steps = { ...slowest.steps, show: performance.now() - before };
     this.bands.took(this.drawn.map(({ took }) => took));
     for (const resolve of this.waiting.splice(0)) resolve();
   }
@@ -166,4 +181,4 @@ function lensOf({ projectionMatrix: { elements: e } }: PerspectiveCamera, width:
   return [(e[0]! * width) / 2, (e[5]! * height) / 2, ((1 - e[8]!) * width) / 2, ((1 + e[9]!) * height) / 2];
 }
 
-export const makeSoftPainter: MakePainter = (...given) => new SoftPainter(...given);
+export const makeSoftPainter: MakePainter = (easel) => new SoftPainter(easel);

@@ -1,5 +1,5 @@
 import type { Kernel } from './kernel.ts';
-import type { Source } from './source.ts';
+import type { Late, Source } from './source.ts';
 import { TILE_HEIGHT, TILE_WIDTH } from './tiles.ts';
 
 /** A source as a picture shows it. */
@@ -7,6 +7,7 @@ export interface Placed {
   id: number; // of a source that was put
   view: Float32Array; // (3,4) camera from the source's space: x to the right, y down, z ahead
   drawn: number; // Gaussians
+  late?: Late;
   values: Float32Array;
 }
 
@@ -19,6 +20,27 @@ export interface Frame {
   placed: Placed[];
 }
 
+/** A part of a picture. */
+export interface Part {
+  columns: [first: number, end: number]; // of tiles
+  rows: [first: number, end: number]; // of pixels
+}
+
+/** What is behind everybody: colours at every so many pixels, between which they go straight; nothing where there are none. */
+export interface Cloth {
+  step: number; // pixels, a multiple of a tile's width
+  columns: number;
+  colours: Float32Array | null; // (rows, columns, 3) display values
+}
+
+/** What the steps of a picture took, ms. */
+export interface Steps {
+  project: number; // evaluates Gaussians and projects them
+  spread: number; // background, where it changed
+  bin: number;
+  blend: number;
+}
+
 const PAIRS = 1 << 18;
 
 /** Draws pictures of sources, in the kernel's memory. */
@@ -27,18 +49,23 @@ export class Rasteriser {
   private readonly held = new Map<number, { source: Source; at: number; room: number }>();
   private readonly view: Room;
   private readonly values: Room;
+  private readonly colours: Room;
   private readonly behind: Room;
   private readonly pixels: Room;
+  private readonly taken: Room;
   /** Tiles that were drawn last: the others had their pixels already. */
   drawnTiles = 0;
-  private shown: { shape: string; behind: Uint32Array } | null = null; // in `pixels`
+  /** What the band drawn last took. */
+  steps: Steps = { project: 0, spread: 0, bin: 0, blend: 0 };
+  private shown: { shape: string; cloth: Cloth } | null = null; // in `pixels` and `behind`
   private readonly room: { gaussians: number; pairs: number; tiles: number };
 
   /** @param pairs of splat and tile, for which there is room at first */
   constructor(kernel: Kernel, pairs = PAIRS) {
     this.kernel = kernel;
     this.room = { gaussians: 0, pairs, tiles: 0 };
-    [this.view, this.values, this.behind, this.pixels] = [new Room(kernel), new Room(kernel), new Room(kernel), new Room(kernel)];
+    [this.view, this.values, this.colours] = [new Room(kernel), new Room(kernel), new Room(kernel)];
+    [this.behind, this.pixels, this.taken] = [new Room(kernel), new Room(kernel), new Room(kernel)];
   }
 
   /** Takes a source, in place of another one of that number. */
@@ -53,28 +80,71 @@ export class Rasteriser {
   /**
    * Draws a band.
    *
-   * @param behind RGBA of the band's background; the same array for the same colours
+   * @param cloth the same one for the same background
    * @returns RGBA of the band, as wide as its tiles; valid until the next call
    */
-  draw(frame: Frame, behind: Uint32Array): Uint8Array<ArrayBuffer> {
+  draw(frame: Frame, cloth: Cloth): Uint8Array<ArrayBuffer> {
     const { kernel } = this;
     const [first, end] = frame.band;
     const stride = 4 * TILE_WIDTH * (end - first);
     this.layOut(frame);
     const shape = [frame.width, frame.height, first, end].join();
-    const keep = this.shown?.shape === shape && this.shown.behind === behind;
-    const under = keep ? this.behind.at(behind.byteLength) : this.behind.write(behind);
+    const before = this.shown?.shape === shape ? this.shown.cloth : null;
+    const keep = before !== null && !before.colours === !cloth.colours;
     const pixels = this.pixels.at(stride * frame.height);
+    const begin = performance.now();
     this.project(frame);
+    const projected = performance.now();
+    const behind = this.behind.at(stride * frame.height);
+    if (cloth !== before) this.spread(cloth, behind, stride, frame.height);
+    const spread = performance.now();
     while (!kernel.bin()) {
       this.room.pairs *= 2;
       this.room.gaussians = 0;
       this.layOut(frame);
       this.project(frame);
     }
-    this.drawnTiles = kernel.draw(under, pixels, stride, Number(keep));
-    this.shown = { shape, behind };
+    const binned = performance.now();
+    this.drawnTiles = kernel.draw(behind, pixels, stride, Number(keep));
+    this.steps = { project: projected - begin, spread: spread - projected, bin: binned - spread, blend: performance.now() - binned };
+    this.shown = { shape, cloth };
     return new Uint8Array(kernel.memory.buffer as ArrayBuffer, pixels, stride * frame.height);
+  }
+
+  /** The next picture is drawn whole. */
+  forget(): void {
+    this.shown = null;
+  }
+
+  /** What the last picture drew anew; null for nothing. */
+  changed({ height }: Frame): Part | null {
+    const { kernel } = this;
+    if (this.drawnTiles === 0) return null;
+    return {
+      columns: [kernel.firstChangedColumn(), kernel.endChangedColumn()],
+      rows: [TILE_HEIGHT * kernel.firstChangedRow(), Math.min(height, TILE_HEIGHT * kernel.endChangedRow())],
+    };
+  }
+
+  /**
+   * Takes a part of the band that was drawn last.
+   *
+   * @param amount by which it is sharpened, 64ths, 0 to 31
+   * @returns RGBA; valid until the next call
+   */
+  take({ height, band: [first, end] }: Frame, { columns: [left, right], rows: [top, bottom] }: Part, amount: number): Uint8Array<ArrayBuffer> {
+    const { kernel } = this;
+    const bytes = 4 * TILE_WIDTH * (right - left) * (bottom - top);
+    const out = this.taken.at(bytes);
+    kernel.take(this.pixels.at(4 * TILE_WIDTH * (end - first) * height), end - first, height, left - first, right - first, top, bottom, amount, out);
+    return new Uint8Array(kernel.memory.buffer as ArrayBuffer, out, bytes);
+  }
+
+  /** Writes the pixels of the background. */
+  private spread({ colours, columns, step }: Cloth, behind: number, stride: number, height: number): void {
+    const { kernel } = this;
+    if (colours) kernel.spread(this.colours.write(colours), columns, step, behind, stride);
+    else new Uint8Array(kernel.memory.buffer, behind, stride * height).fill(0);
   }
 
   private project({ lens, width, height, band, placed }: Frame): void {
@@ -82,11 +152,12 @@ export class Rasteriser {
     for (const one of placed) this.add(one);
   }
 
-  private add({ id, view, drawn, values }: Placed): void {
+  private add({ id, view, drawn, values, late }: Placed): void {
     const { kernel } = this;
     const { source, at } = this.held.get(id)!;
     const [from, given, count] = [this.view.write(view), this.values.write(values), Math.min(drawn, source.count)];
     const [a, b, c, d] = source.sizes;
+    kernel.fade(late?.first ?? count, late?.share ?? 1);
     if (source.kind === 'still') kernel.addStill(from, at, count);
     else if (source.kind === 'head') kernel.addHead(from, at, count, given, a!);
     else if (source.kind === 'window') kernel.addWindow(from, at, count, given, a!, b!, c!, d!);

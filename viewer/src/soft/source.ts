@@ -27,12 +27,20 @@ export type Kind = 'still' | 'head' | 'window' | 'skinned';
 /** Bytes of a row before basis vectors or shapes. */
 export const ROW_BYTES: Record<Kind, number> = { still: 64, head: 64, window: 64, skinned: 96 };
 
+/** Gaussians of a head or a skinned body that appear: those from a number on have a share of their opacity. */
+export interface Late {
+  first: number;
+  share: number;
+}
+
 /** Something on stage that has Gaussians; it moves as its object does. */
 export interface SoftObject {
   /** The source; another one when other Gaussians are to be drawn. */
   readonly source: Source | null;
   /** Number of its first Gaussians that are drawn now. */
   readonly drawn: number;
+  /** Those of them that came later, where there may be such ones. */
+  readonly late?: Late;
   /**
    * What changes from picture to picture.
    *
@@ -42,17 +50,6 @@ export interface SoftObject {
    *   (J,16), shadow map.
    */
   readonly values: Float32Array;
-}
-
-/** One source of several, whose Gaussians follow each other. */
-export function joined(sources: readonly Source[]): Source {
-  const bytes = new Uint8Array(sources.reduce((sum, { rows }) => sum + rows.byteLength, 0));
-  let at = 0;
-  for (const { rows } of sources) {
-    bytes.set(new Uint8Array(rows), at);
-    at += rows.byteLength;
-  }
-  return { ...sources[0]!, count: sources.reduce((sum, { count }) => sum + count, 0), rows: bytes.buffer };
 }
 
 /** New rows, as bytes and as numbers. */

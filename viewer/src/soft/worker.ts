@@ -9,6 +9,6 @@ onmessage = async ({ data }: MessageEvent<Order>) => {
     band.put(data.put, data.source);
     return;
   }
-  const drawn = band.draw(data.frame, data.cloth);
+  const drawn = band.draw(data.frame, data.cloth, data.sharpness);
   postMessage(drawn, { transfer: [drawn.pixels] });
 };

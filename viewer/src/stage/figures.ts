@@ -1,5 +1,8 @@
+import type { Message } from '../words/text.ts';
+
 /** What drawing takes, for the panel. */
 export interface Figures {
+  drawn: Message; // what draws, and why it does
   frames: number; // drawn so far
   evaluation: number; // ms of a picture: who moves, and how
   sort: number; // ms of the last sort, beside the pictures

@@ -1,5 +1,5 @@
 import type { PerspectiveCamera } from 'three';
-import type { Ground } from './scenery.ts';
+import type { Ground } from './camera/ground.ts';
 
 /** A headset, or a phone held up, in which the stage is seen instead of on the page. */
 export interface Presentation {

@@ -1,14 +1,9 @@
 import * as THREE from 'three';
 import type { Backcloth } from '../soft/contract.ts';
+import { footprintOf, type Ground } from './camera/ground.ts';
 
-/** Where somebody stands, world space. */
-export interface Ground {
-  foot: THREE.Vector3; // on the floor, under the middle of the body
-  up: THREE.Vector3; // of the world, of length 1
-  toward: THREE.Vector3; // where the person faces, level, of length 1
-}
-
-const SHADOW = new THREE.Vector2(0.3, 0.22); // m to the side and to the front where it has faded to a third
+const SHADOW = [0.3, 0.22] as const; // m to the side and to the front where it has faded to a third, until feet are known
+const NOTICED = 0.004; // m by which feet move before their shadow does
 
 /**
  * A wall and a floor that go over into each other, and a soft shadow under the feet, behind all
@@ -16,6 +11,9 @@ const SHADOW = new THREE.Vector2(0.3, 0.22); // m to the side and to the front w
  */
 export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMaterial> implements Backcloth {
   version = 0;
+  private ground: Ground | null = null;
+  private followed: Float32Array | null = null;
+
   /** @param colour of the bundle's background, display values */
   constructor(colour: readonly [number, number, number]) {
     const uniforms = {
@@ -25,7 +23,8 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       foot: { value: new THREE.Vector3() },
       up: { value: new THREE.Vector3(0, 1, 0) },
       front: { value: new THREE.Vector3(0, 0, 1) },
-      shadow: { value: SHADOW },
+      shadow: { value: new THREE.Vector2(...SHADOW) },
+      under: { value: new THREE.Vector3() },
       depth: { value: 1 },
       alone: { value: 0 },
     };
@@ -42,13 +41,36 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
    *
    * @param feet whether somebody's feet cast a shadow on it
    */
-  stand({ foot, up, toward }: Ground, feet = true): void {
+  stand(ground: Ground, feet = true): void {
+    const { foot, up, toward } = ground;
     const { uniforms } = this.material;
+    this.ground = ground;
+    this.followed = null;
     uniforms.foot!.value.copy(foot);
+    uniforms.under!.value.copy(foot);
+    uniforms.shadow!.value.set(...SHADOW);
     uniforms.up!.value.copy(up);
     uniforms.front!.value.copy(toward);
     uniforms.depth!.value = feet ? 1 : 0;
     this.visible = true;
+    this.version++;
+  }
+
+  /**
+   * Lays the shadow under somebody's feet.
+   *
+   * @param points (N,3) of the person in the world, m; the same array while nobody has moved
+   */
+  follow(points: Float32Array): void {
+    if (!this.ground || points === this.followed) return;
+    this.followed = points;
+    const print = footprintOf(points, this.ground);
+    if (!print) return;
+    const { under, shadow } = this.material.uniforms as { under: { value: THREE.Vector3 }; shadow: { value: THREE.Vector2 } };
+    const size = new THREE.Vector2(...print.size);
+    if (under.value.distanceTo(print.middle) < NOTICED && shadow.value.distanceTo(size) < NOTICED) return;
+    under.value.copy(print.middle);
+    shadow.value.copy(size);
     this.version++;
   }
 
@@ -70,7 +92,8 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
 
   /** The same as the shader, for pictures that are drawn without. */
   colour(eye: THREE.Vector3, way: THREE.Vector3, out: Float32Array, at: number): void {
-    const { base, foot, up, front } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const { base, foot, up, front, under } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const shadow = this.material.uniforms.shadow!.value as THREE.Vector2;
     const { bright, depth } = this.material.uniforms as Record<string, { value: number }>;
     const light = bright!.value > 0.5;
     const rise = way.dot(up!.value);
@@ -82,8 +105,9 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       const away = place.length();
       ground = smoothstep(0, 2.2, away);
       far = smoothstep(1.2, 5, away);
-      const side = place.dot(SIDE.crossVectors(up!.value, front!.value)) / SHADOW.x;
-      const ahead = place.dot(front!.value) / SHADOW.y;
+      place.add(foot!.value).sub(under!.value);
+      const side = place.dot(SIDE.crossVectors(up!.value, front!.value)) / shadow.x;
+      const ahead = place.dot(front!.value) / shadow.y;
       const near = side * side + ahead * ahead;
       shade = 1 - depth!.value * (0.34 * Math.exp(-near) + 0.22 * Math.exp(-6 * near));
     }
@@ -129,7 +153,7 @@ const VERTEX = `
 
 // Colours are display values, as Gaussians are blended; noise of half a level hides the steps between them.
 const FRAGMENT = `
-  uniform vec3 base, foot, up, front;
+  uniform vec3 base, foot, under, up, front;
   uniform vec2 shadow;
   uniform float bright, depth, alone;
   varying vec3 ray;
@@ -149,7 +173,8 @@ const FRAGMENT = `
       float far = length(place);
       vec3 ground = mix(shade(1.06, 0.3), shade(0.78, 0.12), smoothstep(0.0, 2.2, far));
       colour = mix(ground, base, smoothstep(1.2, 5.0, far));
-      vec2 aside = vec2(dot(place, cross(up, front)), dot(place, front)) / shadow;
+      vec3 away = place + foot - under;
+      vec2 aside = vec2(dot(away, cross(up, front)), dot(away, front)) / shadow;
       float near = dot(aside, aside);
       dark = depth * (0.34 * exp(-near) + 0.22 * exp(-6.0 * near));
     }

@@ -3,22 +3,24 @@ import type { Actor } from '../actor.ts';
 import type { HeadFiles } from '../bundle/load.ts';
 import { eyesOf } from '../head/eyes.ts';
 import { bodyOf, type Manifest } from '../bundle/manifest.ts';
-import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
-import type { MakePainter, Painter } from '../soft/contract.ts';
+import { PageError } from '../errors.ts';
+import type { Painter } from '../soft/contract.ts';
 import { Mean, type Figures } from './figures.ts';
 import { meetingOf, meetingOfBody, type Meeting } from './camera/meeting.ts';
 import { Orbit } from './camera/orbit.ts';
+import { Painting, type Drawing } from './painting.ts';
 import type { Presentation } from './presentation.ts';
 import { ladder, Quality } from './quality.ts';
 import { Scenery } from './scenery.ts';
 import { watchSight } from './sight.ts';
 import { sitterOf } from './camera/sitter.ts';
-import type { Sorter } from './sorter.ts';
-import { SparkPainter } from './spark.ts';
+import type { Sorter } from './webgl/sorter.ts';
+import type { SparkPainter } from './webgl/spark.ts';
 import { groundOf, person, wholeBody } from './camera/subject.ts';
 
 const MOST_PIXELS = 2; // along a side, for one of the page
+const REST = 0.1; // s without a change after which a picture is at rest
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 
 /** Canvas, camera and actors: draws what changed and nothing else, and nothing while nobody can see it. */
@@ -35,8 +37,6 @@ export class Stage {
   bytes = 0; // of the bundle that came before there was somebody to see
   /** Called when the browser takes the picture away and does not give it back. */
   onGone: () => void = () => {};
-  /** What draws. */
-  readonly painter: Painter;
   private readonly quality = new Quality(ladder({ backdrop: false, gaussians: false }));
   private covered = 0; // pixels at the lower edge that controls lie on
   private readonly canvas: HTMLCanvasElement;
@@ -46,18 +46,21 @@ export class Stage {
   private dirty = true;
   private size: readonly [number, number] | null = null; // of pictures, else the canvas's own
   private drew = false; // in the last frame
+  private resting = 0; // s since something changed
   private presentation: Presentation | null = null; // instead of the page
   private readonly evaluation = new Mean(); // ms
   private readonly drawing = new Mean(); // ms
   private running = false; // between `start` and `still`
   private seen = true;
   private readonly ending = new AbortController();
+  private readonly painting: Painting;
 
   /**
+   * @param canvas takes the pictures, and what the visitor does with them
+   * @param drawing what draws
    * @param transparent what is behind the canvas is seen around the avatar
-   * @param makePainter makes what draws, Spark unless something else is given
    */
-  constructor(canvas: HTMLCanvasElement, manifest: Manifest, transparent = false, makePainter?: MakePainter) {
+  constructor(canvas: HTMLCanvasElement, manifest: Manifest, drawing: Drawing, transparent = false) {
     this.canvas = canvas;
     this.manifest = manifest;
     this.transparent = transparent;
@@ -71,9 +74,8 @@ export class Stage {
       },
       gone: () => this.onGone(),
     };
-    this.painter = makePainter
-      ? makePainter(canvas, manifest.background, this.scenery, ports)
-      : new SparkPainter(canvas, this.scene, manifest.background, transparent, ports);
+    const easel = { canvas, scene: this.scene, background: manifest.background, backcloth: this.scenery, transparent };
+    this.painting = new Painting(easel, ports, drawing);
     const body = groundOf(manifest);
     if (body) this.meeting = meetingOfBody(body.ground, body.height);
     this.arrange();
@@ -86,6 +88,21 @@ export class Stage {
     this.fit();
   }
 
+  /** What draws. */
+  get painter(): Painter {
+    return this.painting.painter;
+  }
+
+  /** Whether Gaussians are being sorted. */
+  get sorting(): boolean {
+    return this.painter.sorting;
+  }
+
+  /** When the last sort began, ms of the performance clock. */
+  get lastSortTime(): number {
+    return this.painter.lastSortTime;
+  }
+
   /** What draws the Gaussians by WebGL; another one after its context was lost. */
   get spark(): Sorter {
     return this.webgl.spark;
@@ -96,7 +113,7 @@ export class Stage {
   }
 
   private get webgl(): SparkPainter {
-    if (this.painter instanceof SparkPainter) return this.painter;
+    if (this.painter.path === 'webgl') return this.painter as SparkPainter;
     throw new PageError('This picture is drawn without WebGL.');
   }
 
@@ -115,6 +132,7 @@ export class Stage {
   get figures(): Figures {
     const { painter } = this;
     return {
+      drawn: this.painting.why,
       frames: this.frames,
       evaluation: this.evaluation.value,
       sort: painter.sortTook,
@@ -205,6 +223,21 @@ export class Stage {
     this.fit();
   }
 
+  /** Something else draws from now on; the picture of before stays until it has drawn one. */
+  async redraw(drawing: Drawing): Promise<void> {
+    const prepare = async (painter: Painter) => {
+      this.fit(painter);
+      await painter.settle(this.scene, this.camera);
+      this.ending.signal.throwIfAborted();
+    };
+    await this.painting.change(drawing, prepare, () => {
+      this.quality.aim();
+      this.draw();
+    });
+    this.fit();
+    this.loop();
+  }
+
   /** Starts drawing what the actors do. */
   start(): void {
     this.running = true;
@@ -218,7 +251,7 @@ export class Stage {
     this.ending.abort();
     this.orbit.dispose();
     this.scenery.dispose();
-    this.painter.dispose();
+    this.painting.dispose();
   }
 
   /** Stops the loop and draws one still, well sorted, of the best quality, which stays: for measurements and thumbnails. */
@@ -234,7 +267,10 @@ export class Stage {
 
   /** Draws now; what the canvas holds may be read until the current task ends. */
   draw(): void {
-    for (const actor of this.actors) actor.drawing?.(performance.now());
+    for (const actor of this.actors) {
+      actor.drawing?.(performance.now());
+      if (actor.points) this.scenery.follow(actor.points);
+    }
     const before = performance.now();
     this.painter.paint(this.scene, this.camera, this.presentation !== null);
     this.drawing.add(performance.now() - before);
@@ -269,9 +305,22 @@ export class Stage {
     this.advance(step);
     if (this.presentation || this.orbit.update(step)) this.dirty = true; // a headset wants each picture
     this.drew = this.dirty;
+    this.refine(step);
     if (!this.dirty) return;
     this.dirty = false;
     this.draw();
+  }
+
+  /** Pictures at rest are as fine as can be, those that move as their level of quality says. */
+  private refine(step: number): void {
+    if (!this.painter.refines || this.quality.level.pixels === 1) return;
+    const before = this.fine;
+    this.resting = this.dirty ? 0 : this.resting + step;
+    if (this.fine !== before) this.fit();
+  }
+
+  private get fine(): boolean {
+    return this.resting >= REST;
   }
 
   /** Everybody goes on by some seconds. */
@@ -281,12 +330,12 @@ export class Stage {
     this.evaluation.add(performance.now() - before);
   }
 
-  private fit(): void {
+  private fit(painter = this.painter): void {
     const { clientWidth, clientHeight } = this.canvas;
     const [width, height] = this.size ?? [clientWidth, clientHeight];
-    if (!width || !height || this.painter.presenting) return;
-    const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS) * this.quality.level.pixels;
-    this.painter.fit(width, height, ratio);
+    if (!width || !height || painter.presenting) return;
+    const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS);
+    painter.fit(width, height, ratio, this.size || this.fine ? 1 : this.quality.level.pixels);
     this.orbit.fit({ aspect: width / height, free: Math.max(LEAST_FREE, 1 - this.covered / (clientHeight || height)) });
     this.dirty = true;
   }

@@ -1,10 +1,12 @@
 import type { Part } from '../bundle/load.ts';
+import { nameOf, type Manifest } from '../bundle/manifest.ts';
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
+import { headInThumbnail } from './portrait.ts';
 import { inWords } from './queue.ts';
 
 /** How the visitor wants to talk. */
@@ -41,8 +43,15 @@ export class Overlay {
     atEnd(signal, () => clearTimeout(this.counting));
   }
 
-  greet(name: string, thumbnail: string): void {
-    byId(this.root, 'overlay-name').textContent = name;
+  /**
+   * Tells who is coming.
+   *
+   * @param thumbnail address of the bundle's
+   */
+  greet(manifest: Manifest, thumbnail: string): void {
+    byId(this.root, 'overlay-name').textContent = nameOf(manifest);
+    const crop = headInThumbnail(manifest);
+    if (crop) this.thumbnail.style.transform = `scale(${1 / crop.side}) translate(${-100 * crop.left}%, ${-100 * crop.top}%)`;
     this.thumbnail.crossOrigin = 'anonymous'; // it may be another server's
     this.thumbnail.src = thumbnail;
     this.thumbnail.onload = () => (this.thumbnail.hidden = false);

@@ -18,12 +18,11 @@ export function makeThemeButton(
   changed: (light: boolean) => void,
   signal: AbortSignal,
 ): HTMLButtonElement {
-  const system = matchMedia(LIGHT);
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'round quiet theme';
-  const show = (chosen?: string) => {
-    const light = showTheme(root, chosen) === 'light';
+  const show = (theme: string) => {
+    const light = theme === 'light';
     words.name(button, say(light ? 'theme.dark' : 'theme.light'));
     button.replaceChildren(icon(light ? 'moon' : 'sun'));
     changed(light);
@@ -31,11 +30,20 @@ export function makeThemeButton(
   button.onclick = () => {
     const theme = root.dataset.theme === 'light' ? 'dark' : 'light';
     remember(KEY, theme);
-    show(theme);
+    show(showTheme(root, theme));
   };
-  system.addEventListener('change', () => show(), { signal });
-  show();
+  followTheme(root, show, signal);
   return button;
+}
+
+/**
+ * Makes an element light or dark, now and whenever the visitor's system changes.
+ *
+ * @param changed is told at once, and whenever that happens, which of them it is
+ */
+export function followTheme(root: HTMLElement, changed: (theme: string) => void, signal: AbortSignal): void {
+  matchMedia(LIGHT).addEventListener('change', () => changed(showTheme(root)), { signal });
+  changed(showTheme(root));
 }
 
 /**

@@ -1,4 +1,4 @@
-import { sentenceOf } from '../errors.ts';
+import { PageError, sentenceOf } from '../errors.ts';
 import { icon } from '../ui/icons.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { XR_MODES, type XrMode, type XrPorts } from './ports.ts';
@@ -7,14 +7,15 @@ const ICONS = { 'immersive-vr': 'headset', 'immersive-ar': 'room' } as const;
 
 /**
  * Offers VR and AR where the device has them, also when a headset is plugged in later. What draws for
- * headsets is fetched only then.
+ * headsets is fetched only then. Where the processor draws, the buttons say that it cannot be.
  *
  * @param bar takes the buttons
  * @param notice shows why it does not work
+ * @returns offers them anew: something else draws now
  */
-export async function offerXr(bar: HTMLElement, ports: XrPorts, notice: (sentence: Sentence) => void): Promise<void> {
+export function offerXr(bar: HTMLElement, ports: XrPorts, notice: (sentence: Sentence) => void): () => void {
   const { xr } = navigator;
-  if (!xr) return;
+  if (!xr) return () => {};
   const group = document.createElement('div');
   group.className = 'xr';
   bar.append(group);
@@ -23,10 +24,16 @@ export async function offerXr(bar: HTMLElement, ports: XrPorts, notice: (sentenc
     group.replaceChildren(...modes.map((mode) => makeButton(mode, ports, notice)));
     const [best] = modes;
     ports.stage.enterXr = best ? () => enter(best, ports) : null;
-    if (best) await import('./immersion.ts'); // a session must begin right after the click
+    if (best && isPossible(ports)) await import('./immersion.ts'); // a session must begin right after the click
   };
   xr.addEventListener('devicechange', () => void show(), { signal: ports.signal });
-  await show();
+  void show();
+  return () => void show();
+}
+
+/** Whether what draws can draw for headsets. */
+function isPossible({ stage }: XrPorts): boolean {
+  return stage.painter.path === 'webgl';
 }
 
 async function offered(xr: XRSystem): Promise<XrMode[]> {
@@ -41,11 +48,13 @@ function makeButton(mode: XrMode, ports: XrPorts, notice: (sentence: Sentence) =
   const name = document.createElement('span');
   ports.words.write(name, say(`xr.${mode}`));
   button.append(icon(ICONS[mode]), name);
+  if (!isPossible(ports)) ports.words.write(button, say('xr.soft'), 'title');
   button.onclick = () => enter(mode, ports).catch((error: unknown) => notice(sentenceOf(error)));
   return button;
 }
 
 async function enter(mode: XrMode, ports: XrPorts): Promise<void> {
+  if (!isPossible(ports)) throw new PageError(say('xr.soft'));
   const { Immersion } = await import('./immersion.ts');
   await Immersion.begin(mode, ports);
 }

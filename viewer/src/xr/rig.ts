@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { Ground } from '../stage/scenery.ts';
+import type { Ground } from '../stage/camera/ground.ts';
 
 const NEAREST = 0.5; // m between a visitor and the middle of somebody
 const FARTHEST = 8; // m

@@ -38,7 +38,7 @@ export function hideBody(page: Page): Promise<void> {
 
 /** Stops time on stage, too: faces stand still and nothing is drawn. */
 export function pauseDrawing(page: Page): Promise<void> {
-  return page.evaluate(() => void window.ico3d!.stage.renderer.setAnimationLoop(null));
+  return page.evaluate(() => void window.ico3d!.stage.painter.loop(null));
 }
 
 /** Waits for two refreshes of the screen: until input and the page's observers of itself have had their effect. */

@@ -1,7 +1,9 @@
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
+import type { Page } from 'playwright-core';
 import { Browser, type BrowserOptions } from './browser.ts';
 import { drawSeldom } from './drawing.ts';
+import { drawnBy, type Path } from './path.ts';
 import { REPOSITORY, runPython } from '../python.ts';
 import { readRecord, recordLoudness, recordWire, type Record } from './recorder.ts';
 
@@ -12,11 +14,15 @@ const RECORDING = join(REPOSITORY, '../shared/speech/new-home-in-the-stars-16k.w
 export const VOICE = 0.005; // level of the microphone above which somebody speaks
 export const SILENCE = 1e-4; // level of the avatar under which nothing is heard
 
-/** Opens the page of a server in a small window that draws nothing by itself, and records its conversation. */
-export async function openPage(url: string, options: BrowserOptions = {}): Promise<Browser> {
+/**
+ * Opens the page of a server in a small window that draws nothing by itself, and records its conversation.
+ *
+ * @param path what draws where a test asks for a picture; without Spark a page starts with half of the work
+ */
+export async function openPage(url: string, options: BrowserOptions = {}, path: Path = 'soft'): Promise<Browser> {
   const browser = await Browser.launch({ width: 320, height: 240, ...options });
   await recordWire(browser.context);
-  await browser.open(url);
+  await browser.open(drawnBy(path, url));
   await drawSeldom(browser.page);
   await recordLoudness(browser.page);
   return browser;
@@ -48,4 +54,17 @@ export function lastOnset({ microphone }: Record, end: number): number {
 export function makeVoice(path: string): void {
   const sentence = existsSync(RECORDING) ? RECORDING : SENTENCE;
   runPython('sound/voice.py', path, '2', ...Array.from({ length: 8 }, () => [sentence, '4.5']).flat());
+}
+
+/** Sound waits for a click, as in browsers that are not tested; before the page is opened. */
+export function keepSound(page: Page): Promise<unknown> {
+  return page.addInitScript(() => {
+    const state = Object.getOwnPropertyDescriptor(BaseAudioContext.prototype, 'state')!;
+    let clicked = false;
+    addEventListener('click', () => (clicked = true), { capture: true, once: true });
+    const get = function (this: AudioContext) {
+      return clicked ? state.get!.call(this) : 'suspended';
+    };
+    Object.defineProperty(AudioContext.prototype, 'state', { configurable: true, get });
+  });
 }

@@ -1,6 +1,6 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { runPython } from '../python.ts';
+import { runFork } from '../python.ts';
 import { arrayBuffer } from './head.ts';
 import { scratchFolder } from '../scratch.ts';
 
@@ -27,7 +27,7 @@ export function makeBody(options: { gaussians: number; times: number[]; pictures
   const out = scratchFolder();
   const args = ['--gaussians', String(options.gaussians), '--times', options.times.join()];
   if (options.pictures) args.push('--pictures', options.pictures);
-  runPython('references/body_reference.py', out, ...args);
+  runFork('references/body_reference.py', out, ...args);
   const folder = join(out, 'bundle');
   const { windows } = JSON.parse(readFileSync(join(folder, 'manifest.json'), 'utf8')).body;
   const moments = JSON.parse(readFileSync(join(out, 'reference.json'), 'utf8')) as Moment[];

@@ -2,7 +2,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { drawSeldom } from '../browser/drawing.ts';
-import { runPython } from '../python.ts';
+import { runFork } from '../python.ts';
 import { scratchFolder } from '../scratch.ts';
 
 /** A whole person, and what Python makes of it (`person_reference.py`). */
@@ -21,7 +21,7 @@ export interface PersonReference {
 export function makePerson(options: { body?: 'windows' | 'skinned'; gaussians?: string; first?: number; times?: number[]; pictures?: string } = {}): PersonReference {
   const out = scratchFolder();
   const args = Object.entries(options).flatMap(([name, value]) => [`--${name}`, String(value)]);
-  runPython('references/person_reference.py', out, ...args);
+  runFork('references/person_reference.py', out, ...args);
   const folder = join(out, 'bundle');
   const { fps, rest, max_speed: fastest } = JSON.parse(readFileSync(join(folder, 'animation.json'), 'utf8'));
   const drawn = (name: string) => (options.pictures ? readFileSync(join(out, name)) : null);

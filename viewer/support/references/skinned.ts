@@ -1,6 +1,6 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { runPython } from '../python.ts';
+import { runFork } from '../python.ts';
 import { scratchFolder } from '../scratch.ts';
 import { arrayBuffer } from './head.ts';
 
@@ -28,7 +28,7 @@ export function makeSkinned(options: { gaussians: number; times: number[]; few?:
   const out = scratchFolder();
   const args = ['--gaussians', String(options.gaussians), '--times', options.times.join(), '--few', String(options.few ?? 1)];
   if (options.pictures) args.push('--pictures', options.pictures);
-  runPython('references/skinned_reference.py', out, ...args);
+  runFork('references/skinned_reference.py', out, ...args);
   const moments = JSON.parse(readFileSync(join(out, 'reference.json'), 'utf8')) as SkinnedMoment[];
   const splats = new Float32Array(arrayBuffer(readFileSync(join(out, 'splats.f32'))));
   moments.forEach((moment, i) => {

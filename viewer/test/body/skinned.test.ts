@@ -2,18 +2,17 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
 import { readBakedSkinned } from '../../src/body/skinned/baked.ts';
+import { SkinnedGenerator } from '../../src/body/skinned/generator.ts';
 import { fillTexels, makeTexels } from '../../src/body/skinned/packed.ts';
-import { ShadowMap } from '../../src/body/skinned/shadow.ts';
 import { Skeleton } from '../../src/body/skinned/skeleton.ts';
-import { SoftSkinned } from '../../src/body/skinned/soft.ts';
 import { SKINNED } from '../../src/bundle/load.ts';
 import { bodyOf, checkManifest } from '../../src/bundle/manifest.ts';
 import { parseSafetensors, type Tensor } from '../../src/bundle/safetensors.ts';
 import { makeKernel } from '../../src/soft/kernel.ts';
 import { Rasteriser } from '../../src/soft/rasteriser.ts';
 import { TILE_WIDTH } from '../../src/soft/tiles.ts';
-import { psnr } from '../../support/browser/pictures.ts';
-import { viewOf } from '../../support/browser/view.ts';
+import { psnr, worst } from '../../support/browser/pictures.ts';
+import { clothOf, viewOf } from '../../support/browser/view.ts';
 import { makeSkinned } from '../../support/references/skinned.ts';
 import { arrayBuffer } from '../../support/references/head.ts';
 
@@ -62,19 +61,42 @@ describe('a body on a skeleton that Python baked', () => {
   });
 
   test('is drawn without WebGL as Python draws it', async () => {
-    const map = baked.lamp && new ShadowMap(baked.lamp, info.names.length);
-    const soft = new SoftSkinned(baked, map);
+    const body = new SkinnedGenerator(baked);
+    const { soft } = body;
     const rasteriser = new Rasteriser(await makeKernel());
     rasteriser.put(0, soft.source);
     const { view, lens } = viewOf(manifest.camera, WIDTH, HEIGHT);
-    const behind = new Uint32Array(WIDTH * HEIGHT).fill(manifest.background.reduce((sum, value, k) => sum | (Math.round(255 * value) << (8 * k)), 0));
-    for (const [i, { table, residual }] of reference.moments.entries()) {
-      map?.draw(Float32Array.from(table));
-      soft.pose(Float32Array.from(table), Float64Array.from(residual));
+    const cloth = clothOf(manifest.background, WIDTH, HEIGHT);
+    for (const [i, { rotations, root, residual }] of reference.moments.entries()) {
+      const given = [rotations, root, residual].map((values) => Float64Array.from(values));
+      body.pose({ rotations: given[0]!, root: given[1]!, residual: given[2]! });
       const placed = [{ id: 0, view, drawn: soft.drawn, values: soft.values }];
-      const picture = rasteriser.draw({ lens, width: WIDTH, height: HEIGHT, band: [0, WIDTH / TILE_WIDTH], placed }, behind).filter((_, at) => at % 4 < 3);
+      const picture = rasteriser.draw({ lens, width: WIDTH, height: HEIGHT, band: [0, WIDTH / TILE_WIDTH], placed }, cloth).filter((_, at) => at % 4 < 3);
       expect(psnr(picture, reference.pictures!.subarray(i * picture.length, (i + 1) * picture.length)), `moment ${i}`).toBeGreaterThan(50);
     }
+  });
+
+  test('without WebGL, Gaussians that come later appear by their opacity', async () => {
+    const body = new SkinnedGenerator(baked);
+    const { soft } = body;
+    const { source } = soft;
+    const [rotations, root, residual] = [reference.moments[0]!.rotations, reference.moments[0]!.root, reference.moments[0]!.residual].map((values) => Float64Array.from(values));
+    body.pose({ rotations: rotations!, root: root!, residual: residual! });
+    const { view, lens } = viewOf(manifest.camera, WIDTH, HEIGHT);
+    const first = 100;
+    const fainter = new Float32Array(source!.rows.slice(0));
+    const stride = fainter.length / source!.count;
+    for (let i = first; i < source!.count; i++) fainter[stride * i + 13]! *= 0.5;
+    const draw = async (rows: ArrayBuffer, share: number) => {
+      const rasteriser = new Rasteriser(await makeKernel());
+      rasteriser.put(0, { ...source!, rows });
+      const placed = [{ id: 0, view, drawn: source!.count, values: soft.values, late: { first, share } }];
+      return rasteriser.draw({ lens, width: WIDTH, height: HEIGHT, band: [0, WIDTH / TILE_WIDTH], placed }, clothOf([0.5, 0.5, 0.5], WIDTH, HEIGHT)).slice();
+    };
+    const half = await draw(source!.rows, 0.5);
+    expect(worst(half, await draw(fainter.buffer, 1))).toBe(0);
+    expect(worst(half, await draw(source!.rows, 1))).toBeGreaterThan(10);
+    expect(soft.late).toEqual({ first: source!.count, share: 0 }); // of one file, all are the first
   });
 
   test('its texels hold what the file holds', () => {

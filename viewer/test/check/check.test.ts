@@ -1,7 +1,8 @@
 import { expect, test } from 'vitest';
 import { bad, fair, good, none, report, summary, type Finding } from '../../src/check/finding.ts';
 import { judgeTrips, socketAdvice } from '../../src/check/network.ts';
-import { judgeRate, judgeRenderer } from '../../src/check/picture.ts';
+import { isSoftware } from '../../src/soft/graphics.ts';
+import { judgeGraphics, judgeRate } from '../../src/check/picture.ts';
 import { judgeLevel, judgeTone } from '../../src/check/sound.ts';
 import { english, say } from '../../src/words/text.ts';
 
@@ -26,7 +27,7 @@ test.each([
   ['Apple GPU', 'good'],
   ['ANGLE (NVIDIA, NVIDIA GeForce RTX 3060, OpenGL 4.6)', 'good'],
 ])('%s', (renderer, verdict) => {
-  const finding = judgeRenderer(renderer);
+  const finding = judgeGraphics({ name: renderer, software: isSoftware(renderer) });
   expect(finding.verdict).toBe(verdict);
   expect(english(finding.words)).toContain(renderer);
 });

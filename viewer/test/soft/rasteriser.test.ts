@@ -3,6 +3,7 @@ import { makeKernel } from '../../src/soft/kernel.ts';
 import { Rasteriser, type Frame } from '../../src/soft/rasteriser.ts';
 import { TILE_WIDTH } from '../../src/soft/tiles.ts';
 import { psnr, worst } from '../../support/browser/pictures.ts';
+import { clothOf } from '../../support/browser/view.ts';
 import { makeGaussians } from '../../support/references/gaussians/reference.ts';
 
 const WIDTH = 202; // of half a tile more than whole ones
@@ -10,6 +11,7 @@ const HEIGHT = 150;
 const COLUMNS = Math.ceil(WIDTH / TILE_WIDTH);
 
 const reference = makeGaussians({ gaussians: 2000, size: `${WIDTH}x${HEIGHT}` });
+const background = clothOf(reference.background, WIDTH, HEIGHT);
 const rasteriser = new Rasteriser(await makeKernel());
 rasteriser.put(0, reference.source);
 
@@ -24,10 +26,8 @@ describe('the rasteriser', () => {
 
   /** A band of the picture, (H, W, 3) with the width of its tiles. */
   const draw = (wanted: Frame, by = rasteriser): Uint8Array => {
-    const [red, green, blue] = reference.background.map((value) => Math.round(255 * value)) as [number, number, number];
-    const [first, end] = wanted.band;
-    const behind = new Uint32Array(TILE_WIDTH * (end - first) * HEIGHT).fill(red | (green << 8) | (blue << 16));
-    return by.draw(wanted, behind).filter((_, at) => at % 4 < 3);
+    by.forget();
+    return by.draw(wanted, background).filter((_, at) => at % 4 < 3);
   };
 
   /** The columns from `left` to `right` of a picture of some width. */
@@ -58,34 +58,90 @@ describe('the rasteriser', () => {
   });
 
   test('keeps the pixels of tiles that did not change, and no others', async () => {
-    const behind = new Uint32Array(TILE_WIDTH * COLUMNS * HEIGHT).fill(0x336699);
     const [keeping, fresh] = [new Rasteriser(await makeKernel()), new Rasteriser(await makeKernel())];
     for (const one of [keeping, fresh]) one.put(0, reference.source);
     const tiles = COLUMNS * 3;
     const near = frame(0, COLUMNS);
-    keeping.draw(near, behind);
+    keeping.draw(near, background);
     expect(keeping.drawnTiles).toBe(tiles);
-    keeping.draw(near, behind);
+    keeping.draw(near, background);
     expect(keeping.drawnTiles).toBe(0);
     // One Gaussian after another is left out, comes back, or moves with all others.
     for (const drawn of [1999, 1990, 1998, 2000]) {
-      const picture = keeping.draw({ ...near, placed: [{ ...near.placed[0]!, drawn }] }, behind);
+      const picture = keeping.draw({ ...near, placed: [{ ...near.placed[0]!, drawn }] }, background);
       expect(keeping.drawnTiles).toBeLessThan(tiles);
-      expect(worst(picture, fresh.draw({ ...near, placed: [{ ...near.placed[0]!, drawn }] }, behind.slice()))).toBe(0);
+      fresh.forget();
+      expect(worst(picture, fresh.draw({ ...near, placed: [{ ...near.placed[0]!, drawn }] }, background))).toBe(0);
       expect(fresh.drawnTiles).toBe(tiles);
     }
     const moved = near.placed[0]!.view.map((value, i) => value + (i === 3 ? 0.01 : 0));
-    const picture = keeping.draw({ ...near, placed: [{ ...near.placed[0]!, view: moved }] }, behind);
-    expect(worst(picture, fresh.draw({ ...near, placed: [{ ...near.placed[0]!, view: moved }] }, behind.slice()))).toBe(0);
-    // Another background, and another shape, are drawn anew.
-    keeping.draw(near, behind.slice());
-    expect(keeping.drawnTiles).toBe(tiles);
-    keeping.draw(frame(0, COLUMNS - 1), behind);
+    const picture = keeping.draw({ ...near, placed: [{ ...near.placed[0]!, view: moved }] }, background);
+    fresh.forget();
+    expect(worst(picture, fresh.draw({ ...near, placed: [{ ...near.placed[0]!, view: moved }] }, background))).toBe(0);
+    // Another background, none, and another shape, are drawn anew.
+    for (const cloth of [clothOf([0.1, 0.2, 0.3], WIDTH, HEIGHT), { ...background, colours: null }, background]) {
+      keeping.draw(near, cloth);
+      expect(keeping.drawnTiles).toBe(tiles);
+    }
+    keeping.draw(frame(0, COLUMNS - 1), background);
     expect(keeping.drawnTiles).toBe(tiles - 3);
   });
 
-  test('shows the background where nothing is', () => {
-    const picture = draw(frame(0, COLUMNS, 0));
-    expect(new Set(picture)).toEqual(new Set(reference.background.map((value) => Math.round(255 * value))));
+  test('lets the Gaussians of a head that came later appear by their opacity', async () => {
+    const light = [50, 50, 50, 0]; // logits: white, half opaque
+    const head = [-0.5, 0.5].flatMap((aside) => [aside, 0, 2, 1, 0, 0, 0, 0.1, 0.1, 0.1, 0, ...light, 0]);
+    const one = new Rasteriser(await makeKernel());
+    one.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head).buffer, sizes: [0] });
+    const black = clothOf([0, 0, 0], WIDTH, HEIGHT);
+    const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
+    const shine = (share: number) => {
+      const placed = [{ id: 0, view, drawn: 2, values: new Float32Array(0), late: { first: 1, share } }];
+      const picture = one.draw({ lens: [100, 100, 100, 75], width: WIDTH, height: HEIGHT, band: [0, COLUMNS], placed }, black);
+      return [75, 125].map((x) => picture[4 * (75 * TILE_WIDTH * COLUMNS + x)]!);
+    };
+    const [first, second] = shine(1);
+    expect(first).toBeGreaterThan(100);
+    expect(second).toBe(first);
+    for (const share of [0.25, 0.5, 0]) {
+      const [before, after] = shine(share);
+      expect(before).toBe(first);
+      expect(Math.abs(after! - share * first!)).toBeLessThanOrEqual(1);
+    }
+  });
+
+  test('draws where the background changed anew, and nothing else', async () => {
+    const [keeping, fresh] = [new Rasteriser(await makeKernel()), new Rasteriser(await makeKernel())];
+    for (const one of [keeping, fresh]) one.put(0, reference.source);
+    const shadow = (middle: number) =>
+      clothOf((x, y) => reference.background.map((value) => value * (1 - 0.5 * Math.exp(-(((x - middle) / 20) ** 2) - ((y - 130) / 10) ** 2))), WIDTH, HEIGHT);
+    const wanted = frame(0, COLUMNS, 1000);
+    keeping.draw(wanted, shadow(100));
+    for (const middle of [101, 108, 60]) {
+      const picture = keeping.draw(wanted, shadow(middle));
+      expect(keeping.drawnTiles).toBeGreaterThan(5);
+      expect(keeping.drawnTiles).toBeLessThan(COLUMNS * 2); // of three rows of tiles
+      fresh.forget();
+      expect(worst(picture, fresh.draw(wanted, shadow(middle)))).toBe(0);
+      keeping.draw(wanted, shadow(middle)); // another one that looks the same
+      expect(keeping.drawnTiles).toBe(0);
+    }
+  });
+
+  test('shows the background where nothing is, straight between its colours', () => {
+    const sloping = clothOf((x, y) => [x / 300, y / 200, 0.5], WIDTH, HEIGHT);
+    const picture = rasteriser.draw(frame(0, COLUMNS, 0), sloping);
+    const sums = [0, 0, 0];
+    let most = 0; // levels by which a pixel is off
+    for (let i = 0; i < WIDTH * HEIGHT; i++) {
+      const [x, y] = [i % WIDTH, Math.floor(i / WIDTH)];
+      const at = 4 * (TILE_WIDTH * COLUMNS * y + x);
+      for (const [k, value] of [(255 * x) / 300, (255 * y) / 200, 127.5].entries()) {
+        const off = picture[at + k]! - value;
+        most = Math.max(most, Math.abs(off), 255 - picture[at + 3]!);
+        sums[k]! += off;
+      }
+    }
+    expect(most).toBeLessThan(1.001); // a level at most, by the noise
+    for (const sum of sums) expect(Math.abs(sum) / (WIDTH * HEIGHT)).toBeLessThan(0.02); // which adds nothing on the whole
   });
 });

@@ -293,3 +293,17 @@ describe('a picture of another shape', () => {
     expect(visit.orbit.camera.position.distanceTo(new Vector3(...eye))).toBeLessThan(1e-9);
   });
 });
+
+test('a camera at rest stays where it is to the last digit, or every picture would be of another view', () => {
+  const visit = new Visit();
+  const numbers = () => [...visit.orbit.camera.position.toArray(), ...visit.orbit.camera.quaternion.toArray()];
+  for (const aside of [37, -61, 90]) {
+    visit.canvas.drag(aside, 0);
+    const dragged = numbers();
+    visit.settle();
+    const before = numbers();
+    expect(before).not.toEqual(dragged); // what was turned ran out
+    for (let i = 0; i < 200; i++) visit.orbit.update(1 / 60);
+    expect(numbers()).toEqual(before);
+  }
+});

@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { without } from '../../src/stage/ordering.ts';
+import { without } from '../../src/stage/webgl/ordering.ts';
 
 describe('an order of Gaussians', () => {
   const order = Uint32Array.of(7, 0, 5, 2, 9, 3, 0xffffffff, 0xffffffff);

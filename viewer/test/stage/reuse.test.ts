@@ -1,7 +1,7 @@
 import type { SparkRenderer } from '@sparkjsdev/spark';
 import { Vector3 } from 'three';
 import { expect, test } from 'vitest';
-import { keepUnchanged } from '../../src/stage/reuse.ts';
+import { keepUnchanged } from '../../src/stage/webgl/reuse.ts';
 
 /** As much of Spark's accumulator as the choice needs. */
 function makeAccumulator() {

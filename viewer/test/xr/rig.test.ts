@@ -1,6 +1,6 @@
 import { Quaternion, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
-import type { Ground } from '../../src/stage/scenery.ts';
+import type { Ground } from '../../src/stage/camera/ground.ts';
 import { Rig } from '../../src/xr/rig.ts';
 import { random } from '../../support/random.ts';
 

@@ -15,6 +15,7 @@ export class SkinnedBody implements Actor {
   private readonly fps: number;
   private readonly pose: Pose;
   private readonly growth: Growth;
+  private joints: Float32Array | null = null; // positions in the pose, where they were asked for
   private posing = false; // whether a pose was given by `strike`
 
   constructor(baked: BakedSkinned, motion: Motion) {
@@ -41,6 +42,11 @@ export class SkinnedBody implements Actor {
     return true;
   }
 
+  /** Positions (J,3) of the joints. */
+  get points(): Float32Array {
+    return (this.joints ??= this.generator.places());
+  }
+
   /** Whether all of its Gaussians have come. */
   get whole(): boolean {
     return this.growth.hasBegun;
@@ -63,7 +69,7 @@ export class SkinnedBody implements Actor {
     this.pose.rotations.set(rotations);
     this.pose.root.set(root);
     this.generator.skeleton.interpolate(this.pose);
-    this.generator.pose(this.pose);
+    this.showPose();
   }
 
   limit(share: number): void {
@@ -88,6 +94,11 @@ export class SkinnedBody implements Actor {
   private replay(): void {
     this.shown.time = this.motion.time;
     this.generator.skeleton.recorded(this.shown.time * this.fps, this.pose);
+    this.showPose();
+  }
+
+  private showPose(): void {
     this.generator.pose(this.pose);
+    this.joints = null;
   }
 }

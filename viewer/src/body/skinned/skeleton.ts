@@ -106,6 +106,16 @@ export class Skeleton {
   }
 }
 
+/** Where joints at rest are moved by a table of `Skeleton`: (J,3) positions, m. */
+export function placesOf(rest: readonly Vector[], table: Float32Array): Float32Array {
+  return Float32Array.from({ length: 3 * rest.length }, (_, i) => {
+    const [joint, axis] = [Math.floor(i / 3), i % 3];
+    const [x, y, z] = rest[joint]!;
+    const row = TABLE_ROW * joint + 4 * axis;
+    return table[row]! * x + table[row + 1]! * y + table[row + 2]! * z + table[row + 3]!;
+  });
+}
+
 /** Features of a joint's rotation by which poses are compared: sin(angle / 2) times the axis. */
 function feature(quat: Quat): Vector {
   const [, x, y, z] = upper(quat);

@@ -1,65 +1,65 @@
 import { SHADOW } from '../../shared.ts';
-import { joined, makeRows, ROW_BYTES, type SoftObject, type Source } from '../../soft/source.ts';
+import { PackedParts } from '../../soft/parts.ts';
+import { makeRows, ROW_BYTES, type Late, type SoftObject, type Source } from '../../soft/source.ts';
 import type { BakedSkinned, SkinnedRows } from './baked.ts';
 import type { ShadowMap } from './shadow.ts';
-import { TABLE_ROW } from './skeleton.ts';
 
 const MILLIMETRE = 1e-3;
 const LAMP = 4 * 8; // where it begins among the values, behind the light
 const RESIDUAL = LAMP + 4 * 5;
 const TABLE = RESIDUAL + 8;
 
+/** A body on a skeleton as it is now. */
+export interface SkinnedNow {
+  readonly version: number; // another one whenever it looks otherwise
+  readonly baked: BakedSkinned;
+  readonly parts: readonly SkinnedRows[];
+  readonly table: Float32Array; // (J,TABLE_ROW) joints
+  readonly residual: Float64Array; // (K,) coefficients of the shapes
+  readonly map: ShadowMap | null;
+  readonly most: number; // Gaussians that are drawn
+  readonly grown: number; // share of what came after the first part that is seen
+}
+
 /** A body on a skeleton for the processor's path. */
 export class SoftSkinned implements SoftObject {
-  /** Gaussians that are drawn at most. */
-  limit = Infinity;
-  readonly values: Float32Array;
-  private readonly info: BakedSkinned['info'];
-  private readonly parts: SkinnedRows[];
-  private shown: number; // Gaussians that came and may be seen
-  private readonly map: ShadowMap | null;
-  private packed: Source | null = null;
+  private readonly body: SkinnedNow;
+  private readonly packed: PackedParts<SkinnedRows>;
+  private readonly written: Float32Array;
+  private version = -1; // of the body, whose values were written
 
-  /** @param map what the lamp sees */
-  constructor(baked: BakedSkinned, map: ShadowMap | null) {
-    const { info, light, lamp } = baked;
-    this.info = info;
-    this.parts = [baked];
-    this.map = map;
-    this.shown = baked.count;
-    const behind = TABLE + TABLE_ROW * info.names.length;
-    this.values = new Float32Array(behind + (map?.depths.length ?? 0));
-    for (let k = 0; k < 8; k++) this.values.set(light.subarray(3 * k, 3 * k + 3), 4 * k);
+  constructor(body: SkinnedNow) {
+    const { baked: { info, light, lamp }, map, table } = body;
+    this.body = body;
+    this.packed = new PackedParts(body.parts, (rows) => pack(rows, info, map ? SHADOW.side : 0));
+    this.written = new Float32Array(TABLE + table.length + (map?.depths.length ?? 0));
+    for (let k = 0; k < 8; k++) this.written.set(light.subarray(3 * k, 3 * k + 3), 4 * k);
     if (!lamp || !map) return;
-    for (let k = 0; k < 3; k++) this.values.set(map.axes.subarray(3 * k, 3 * k + 3), LAMP + 4 * k);
-    this.values.set([...lamp.strength, SHADOW.texel, SHADOW.bias, SHADOW.off, SHADOW.wrap, SHADOW.edge], LAMP + 12);
+    for (let k = 0; k < 3; k++) this.written.set(map.axes.subarray(3 * k, 3 * k + 3), LAMP + 4 * k);
+    this.written.set([...lamp.strength, SHADOW.texel, SHADOW.bias, SHADOW.off, SHADOW.wrap, SHADOW.edge], LAMP + 12);
   }
 
   get source(): Source {
-    const side = this.map ? SHADOW.side : 0;
-    return (this.packed ??= joined(this.parts.map((rows) => pack(rows, this.info, side))));
+    return this.packed.source;
   }
 
   get drawn(): number {
-    return Math.min(this.limit, this.shown);
+    return Math.min(this.body.most, this.packed.drawn(this.body.grown));
   }
 
-  /** Takes the Gaussians that come after the first ones; they are not seen until `show`. */
-  complete(rest: SkinnedRows): void {
-    this.parts.push(rest);
-    this.packed = null;
+  get late(): Late {
+    return this.packed.late(this.body.grown);
   }
 
-  /** Draws what came later, too. */
-  show(): void {
-    this.shown = this.parts.reduce((sum, { count }) => sum + count, 0);
-  }
-
-  /** Takes a pose: the table of joints (J,TABLE_ROW) and the coefficients of the shapes; the shadow map is drawn. */
-  pose(table: Float32Array, residual: Float64Array): void {
-    this.values.set(residual, RESIDUAL);
-    this.values.set(table, TABLE);
-    if (this.map) this.values.set(this.map.depths, TABLE + table.length);
+  get values(): Float32Array {
+    const { version, table, residual, map } = this.body;
+    if (version !== this.version) {
+      this.version = version;
+      this.written.set(residual, RESIDUAL);
+      this.written.set(table, TABLE);
+      if (map) this.written.set(map.depths, TABLE + table.length);
+    }
+    return this.written;
   }
 }
 

@@ -16,6 +16,16 @@ const LEAST_SCALE: f32 = 1e-6; // m
 const TABLE_ROW: usize = 64; // bytes of a joint: (3,4) matrix, quaternion wxyz
 const LOG2_E: f32 = 1.4426950408889634;
 
+// From this Gaussian of a source on, opacities are multiplied by a share.
+let late: i32 = 0;
+let lateShare: f32 = 1;
+
+/** Lets the Gaussians of the next source appear from number `first` on, with a share of their opacity. */
+export function fade(first: i32, share: f32): void {
+  late = first;
+  lateShare = share;
+}
+
 /** What stands still: centre, rotation, scales, colour and opacity. */
 export function addStill(view: usize, rows: usize, count: i32): void {
   const end = rows + STILL * <usize>count;
@@ -33,6 +43,7 @@ export function addStill(view: usize, rows: usize, count: i32): void {
 export function addHead(view: usize, rows: usize, count: i32, values: usize, rank: i32): void {
   const stride = HEAD + 4 * <usize>rank;
   const end = rows + stride * <usize>count;
+  const fading = rows + stride * <usize>min(late, count);
   for (let at = rows; at < end; at += stride) {
     const s0 = load<f32>(at, 28);
     const s1 = load<f32>(at, 32);
@@ -45,7 +56,7 @@ export function addHead(view: usize, rows: usize, count: i32, values: usize, ran
       blend = f32x4.add(blend, f32x4.mul(v128.load32_splat(values + (k << 2)), vector));
     }
     const light = sigmoid(f32x4.add(v128.load(at, 44), f32x4.mul(v128.load32_splat(at, 40), blend)));
-    const opacity = f32x4.extract_lane(light, 3);
+    const opacity: f32 = f32x4.extract_lane(light, 3) * (at < fading ? ONE : lateShare);
     const record = splat(view, load<f32>(at, 12), load<f32>(at, 16), load<f32>(at, 20), load<f32>(at, 24), s0, s1, s2, opacity);
     if (record) colour(record, light);
   }
@@ -97,6 +108,7 @@ const TABLE: usize = RESIDUAL + 8 * 4;
 export function addSkinned(view: usize, rows: usize, count: i32, values: usize, shapes: i32, joints: i32, side: i32): void {
   const stride = SKINNED + 8 * <usize>shapes;
   const end = rows + stride * <usize>count;
+  const fading = rows + stride * <usize>min(late, count);
   const table = values + TABLE;
   const map = table + TABLE_ROW * <usize>joints;
   for (let at = rows; at < end; at += stride) {
@@ -130,7 +142,7 @@ export function addSkinned(view: usize, rows: usize, count: i32, values: usize, 
     const s1 = load<f32>(at, 32);
     const s2 = load<f32>(at, 36);
     if (!approach(view, cx, cy, cz, max(s0, max(s1, s2)))) continue;
-    const record = splatTurned(view, product(turn, v128.load(at, 12)), s0, s1, s2, load<f32>(at, 52));
+    const record = splatTurned(view, product(turn, v128.load(at, 12)), s0, s1, s2, load<f32>(at, 52) * (at < fading ? ONE : lateShare));
     if (!record) continue;
     const facing = f32x4.replace_lane(v128.load(at, 60), 3, 0);
     let nx = sum(f32x4.mul(x, facing));

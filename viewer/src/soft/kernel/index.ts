@@ -1,17 +1,19 @@
 import { drawTile } from './blend.ts';
-import { addHead, addSkinned, addStill, addWindow } from './evaluate.ts';
+import { spreadCloth } from './cloth.ts';
+import { addHead, addSkinned, addStill, addWindow, fade } from './evaluate.ts';
 import { digestSplats, forget, keeps, useRoomToKeep } from './keep.ts';
 import { RECORD, TILE_HEIGHT, TILE_WIDTH } from './numbers.ts';
 import { begin as beginProjection, count, useRoom } from './project.ts';
+import { take } from './sharpen.ts';
 import { fillTiles, listPairs, sortByDepth } from './tiles.ts';
 
 /** What the page calls. All addresses are bytes of this module's memory. */
 
-export { addHead, addSkinned, addStill, addWindow };
+export { addHead, addSkinned, addStill, addWindow, fade, take };
 
-/** Room for `bytes`, for ever. */
+/** Room for `bytes`, for ever, and for one vector behind them, which may be read beyond the last number. */
 export function reserve(bytes: usize): usize {
-  return (heap.alloc(bytes + 15) + 15) & ~15;
+  return (heap.alloc(bytes + 31) + 15) & ~15;
 }
 
 let order: usize = 0;
@@ -24,6 +26,12 @@ let mostPairs: u32 = 0;
 let firstColumn: i32 = 0;
 let endColumn: i32 = 0;
 let height: i32 = 0;
+
+// What the last picture drew, in columns and rows of tiles.
+let changedLeft: i32 = 0;
+let changedRight: i32 = 0;
+let changedTop: i32 = 0;
+let changedBottom: i32 = 0;
 
 /** Lays out the memory for pictures of so many Gaussians, pairs of splat and tile, and tiles, at most. */
 export function layOut(gaussians: i32, newMostPairs: u32, tiles: i32): void {
@@ -55,10 +63,15 @@ export function bin(): bool {
   return true;
 }
 
+/** Writes the background of the band, see `cloth.ts`; tiles in which it changed are drawn anew with the next picture. */
+export function spread(colours: usize, columns: i32, step: i32, behind: usize, stride: usize): void {
+  spreadCloth(colours, columns, step, firstColumn, endColumn, height, behind, stride);
+}
+
 /**
  * Draws the band: RGBA, rows of `stride` bytes, over another picture of the same shape.
  *
- * @param keep tiles whose splats are those of the picture before keep their pixels
+ * @param keep tiles whose splats and background are those of the picture before keep their pixels
  * @returns number of the tiles that were drawn
  */
 export function draw(behind: usize, pixels: usize, stride: usize, keep: bool): i32 {
@@ -66,6 +79,10 @@ export function draw(behind: usize, pixels: usize, stride: usize, keep: bool): i
   let begin = entries;
   let counter = counts;
   let drawn = 0;
+  changedLeft = i32.MAX_VALUE;
+  changedTop = i32.MAX_VALUE;
+  changedRight = 0;
+  changedBottom = 0;
   if (!keep) forget((endColumn - firstColumn) * down);
   digestSplats();
   for (let column = firstColumn; column < endColumn; column++) {
@@ -76,12 +93,33 @@ export function draw(behind: usize, pixels: usize, stride: usize, keep: bool): i
       if (!keeps((counter - counts) >> 2, begin, end)) {
         drawTile(begin, end, column * TILE_WIDTH, above, <usize>min(TILE_HEIGHT, height - above), behind + place, pixels + place, stride);
         drawn++;
+        changedLeft = min(changedLeft, column);
+        changedRight = max(changedRight, column + 1);
+        changedTop = min(changedTop, row);
+        changedBottom = max(changedBottom, row + 1);
       }
       begin = end;
       counter += 4;
     }
   }
   return drawn;
+}
+
+/** The tiles that were drawn last lie within these columns of the picture and rows of tiles. */
+export function firstChangedColumn(): i32 {
+  return changedLeft;
+}
+
+export function endChangedColumn(): i32 {
+  return changedRight;
+}
+
+export function firstChangedRow(): i32 {
+  return changedTop;
+}
+
+export function endChangedRow(): i32 {
+  return changedBottom;
 }
 
 /** Number of the splats that are seen in the band. */

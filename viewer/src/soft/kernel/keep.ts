@@ -32,9 +32,14 @@ export function digestSplats(): void {
   }
 }
 
-/** Nobody knows what tiles show. */
+/** Nobody knows what any tile shows. */
 export function forget(tiles: i32): void {
   memory.fill(shown, 0, 8 * <usize>tiles);
+}
+
+/** Nobody knows what a tile shows. */
+export function renew(tile: usize): void {
+  store<u64>(shown + (tile << 3), 0);
 }
 
 /** Whether a tile with these entries shows them already; from now on it does. */

@@ -32,7 +32,7 @@ export function sigmoid(x: v128): v128 {
   return f32x4.div(one, f32x4.add(one, heldPowerOfTwo(f32x4.mul(x, f32x4.splat(-1.4426950408889634)))));
 }
 
-/** The four numbers from 0 to 255 in each lane's word, with full opacity above them. */
+/** Four numbers from 0 to 1 as the bytes of each lane's word. */
 // @ts-ignore: decorator
 @inline
 export function bytesOf(red: v128, green: v128, blue: v128, alpha: v128): v128 {

@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { Ground } from '../scenery.ts';
+import type { Ground } from './ground.ts';
 import { groundUnder } from './subject.ts';
 import type { Sitter } from './sitter.ts';
 

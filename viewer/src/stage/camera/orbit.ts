@@ -21,6 +21,7 @@ const KEY_STEP = THREE.MathUtils.degToRad(4);
 const KEY_ZOOM = 1.08;
 const FOCUS = 0.5; // of the distance that is left after a double click
 const ROOM = 1.25; // times the least distance: nearer, a double click goes back
+const ROUNDING = 1e-9; // m, and parts of a quaternion: no movement
 const BESIDE = 0.45; // m from the spine: what is farther is nobody
 
 /** A flight that has begun. */
@@ -65,10 +66,21 @@ export class Orbit {
   /** Lets the camera glide or fly on by some seconds; true if it moved. */
   update(step = 0): boolean {
     if (this.journey) this.travel(this.journey, step);
-    this.controls.update();
+    this.glide();
     const changed = this.changed;
     this.changed = false;
     return changed;
+  }
+
+  /** What the visitor turned runs out. At rest the library moves the camera by its last digits, picture by picture: no picture would be of the same view. */
+  private glide(): void {
+    const { position, quaternion } = this.camera;
+    const [place, turn] = [position.clone(), quaternion.clone()];
+    this.controls.update();
+    const moves = [...position.toArray(), ...quaternion.toArray()];
+    if (![...place.toArray(), ...turn.toArray()].every((before, i) => Math.abs(moves[i]! - before) < ROUNDING)) return;
+    position.copy(place);
+    quaternion.copy(turn);
   }
 
   /** Points the camera at somebody. */

@@ -3,7 +3,7 @@ import { bodyOf, type Manifest } from '../../bundle/manifest.ts';
 import { boundsOf, boundsOfBody } from './bounds.ts';
 import { closeUp, figure, portrait, whole } from './framing.ts';
 import type { Subject } from './orbit.ts';
-import type { Ground } from '../scenery.ts';
+import type { Ground } from './ground.ts';
 import { corners, type Sitter } from './sitter.ts';
 
 const FRONT = THREE.MathUtils.degToRad(75); // to either side: heads are recorded from the front

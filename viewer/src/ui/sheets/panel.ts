@@ -37,6 +37,7 @@ export class Panel {
     this.set('figure.draw', `${this.number(now.draw, 1)} ms`);
     this.set('figure.sort', `${this.number(now.sort, 0)} ms`);
     this.set('figure.gaussians', this.number(now.gaussians, 0));
+    this.set('figure.drawn', now.drawn);
     this.set('figure.pixels', now.pixels.join(' × '));
     this.set('figure.quality', say('figure.level', { level: now.levels - now.level + 1, levels: now.levels }));
     this.set('figure.bytes', `${this.number(now.bytes / 1e6, 1)} MB`);

@@ -1,7 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Source } from '../../../src/soft/source.ts';
-import { runPython } from '../../python.ts';
+import { runFork } from '../../python.ts';
 import { scratchFolder } from '../../scratch.ts';
 import { arrayBuffer } from '../head.ts';
 
@@ -19,7 +19,7 @@ export interface GaussiansReference {
 /** Draws random Gaussians, or those of a bundle, with Python. */
 export function makeGaussians(options: { bundle?: string; gaussians?: number; size: string }): GaussiansReference {
   const out = scratchFolder();
-  runPython('references/gaussians/gaussians_reference.py', out, ...Object.entries(options).flatMap(([name, value]) => [`--${name}`, String(value)]));
+  runFork('references/gaussians/gaussians_reference.py', out, ...Object.entries(options).flatMap(([name, value]) => [`--${name}`, String(value)]));
   const given = new Float32Array(arrayBuffer(readFileSync(join(out, 'gaussians.f32'))));
   const count = given.length / NUMBERS;
   const rows = new Float32Array(16 * count);

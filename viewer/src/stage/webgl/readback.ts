@@ -1,6 +1,6 @@
-import type { SplatGenerator } from '@sparkjsdev/spark';
-import { floatFromHalf } from '../half.ts';
-import type { Stage } from './stage.ts';
+import type { Generator } from '../../gaussians/generator.ts';
+import { floatFromHalf } from '../../half.ts';
+import type { Stage } from '../stage.ts';
 
 const WORDS = 4; // uint32 per texel
 const WIDTH = 2048; // Spark's texture width
@@ -12,14 +12,14 @@ export interface Splats {
 }
 
 /** Reads back what is drawn of a generator. For tests: it stalls the GPU. */
-export function readSplats(stage: Stage, generator: SplatGenerator): Splats {
+export function readSplats(stage: Stage, generator: Generator): Splats {
   return unpack(...readTexels(stage, generator), generator.numSplats);
 }
 
 /** Reads back what is drawn of a generator as the texels of Spark's extended splats, two for each; rows are filled up. */
-export function readTexels({ spark, renderer }: Stage, generator: SplatGenerator): [Uint32Array, Uint32Array] {
+export function readTexels({ spark, renderer }: Stage, generator: Generator): [Uint32Array, Uint32Array] {
   const target = spark.display.target!;
-  const { base, count } = spark.display.mapping.find(({ node }) => node === generator)!;
+  const { base, count } = spark.display.mapping.find(({ node }) => node.parent === generator)!;
   const rows = Math.ceil(count / WIDTH);
   const read = (texture: number) => {
     const out = new Uint32Array(WORDS * WIDTH * rows);

@@ -1,4 +1,4 @@
-import { atEnd } from '../lifetime.ts';
+import { atEnd } from '../../lifetime.ts';
 
 const PATIENCE = 10_000; // ms until a context that was lost counts as gone
 

@@ -1,13 +1,10 @@
 import { dyno, SplatMesh } from '@sparkjsdev/spark';
-import type { Vector3 } from 'three';
-import type { Actor } from '../actor.ts';
-import type { BundleFiles } from '../bundle/load.ts';
-import { PageError } from '../errors.ts';
-import { makeRows, ROW_BYTES, type SoftObject, type Source } from '../soft/source.ts';
-
-const LEAST = 1e-9; // m, of a scale
-const HASH = 2654435769;
-const APART = 1e-3; // by which splats of one size differ, each by a share of its own: else all of them would go at once
+import type { Actor } from '../../actor.ts';
+import { PageError } from '../../errors.ts';
+import type { SoftObject, Source } from '../../soft/source.ts';
+import { isTurned, type SplatFile } from './file.ts';
+import { APART, HASH, NUMBERS, sizeOf, sourceOf } from './rows.ts';
+import type { StillGenerator } from './still.ts';
 
 /** The splats behind the person, which stand still. */
 class Backdrop implements Actor {
@@ -24,7 +21,7 @@ class Backdrop implements Actor {
     this.least = least;
     this.soft = Object.assign(mesh, { soft: new SoftBackdrop(mesh) }).soft;
     const sizes: number[] = [];
-    mesh.forEachSplat((index, _, scales, __, opacity) => sizes.push(sizeOf(index, scales, opacity)));
+    mesh.forEachSplat((index, _, { x, y, z }, __, opacity) => sizes.push(sizeOf(index, opacity, x, y, z)));
     this.sizes = Float32Array.from(sizes).sort();
   }
 
@@ -38,11 +35,6 @@ class Backdrop implements Actor {
     this.mesh.updateVersion();
     this.soft.thin(share);
   }
-}
-
-/** Opacity times the two larger scales, m². */
-function sizeOf(index: number, { x, y, z }: Vector3, opacity: number): number {
-  return ((opacity * x * y * z) / Math.max(LEAST, Math.min(x, y, z))) * (1 + (APART * (Math.imul(index, HASH) >>> 8)) / 2 ** 24);
 }
 
 /** The splats for the processor's path, the largest ones first; seen from everywhere in the colour of their mean. */
@@ -67,28 +59,42 @@ class SoftBackdrop implements SoftObject {
 }
 
 function pack(mesh: SplatMesh): Source {
-  const splats: { size: number; row: number[] }[] = [];
+  const rows = new Float32Array(NUMBERS * mesh.numSplats);
   mesh.forEachSplat((index, centre, scales, { x, y, z, w }, opacity, { r, g, b }) => {
-    const row = [...centre.toArray(), w, x, y, z, ...scales.toArray(), r, g, b, opacity];
-    splats.push({ size: sizeOf(index, scales, opacity), row });
+    rows.set([...centre.toArray(), w, x, y, z, ...scales.toArray(), r, g, b, opacity], NUMBERS * index);
   });
-  splats.sort((a, b) => b.size - a.size);
-  const { rows, floats } = makeRows(splats.length, ROW_BYTES.still);
-  for (const [i, { row }] of splats.entries()) floats.set(row, (i * ROW_BYTES.still) / 4);
-  return { kind: 'still', count: splats.length, rows, sizes: [] };
+  return sourceOf(rows);
 }
 
-/** Fetches the splats behind the person, if the bundle has some. */
-export async function makeBackdrop(files: BundleFiles): Promise<Actor | null> {
-  const splats = await files.backdrop();
-  if (!splats) return null;
-  const { name, bytes } = splats;
+/** Reads the splats behind the person. */
+export async function makeBackdrop(file: SplatFile): Promise<Actor> {
   const least = { value: 0 };
-  const mesh = new SplatMesh({ fileBytes: bytes, fileName: name, objectModifier: thinner(least) });
+  const mesh = makeMesh(file, least);
   await mesh.initialized.catch(() => {
-    throw new PageError(`${name} holds no splats that this page can read.`);
+    throw new PageError(`${file.name} holds no splats that this page can read.`);
   });
   return new Backdrop(mesh, least);
+}
+
+/** What Spark draws of splats that were read without it, as soon as it has read them, too. */
+export function makeTwin(of: StillGenerator): SplatMesh {
+  const least = { value: 0 };
+  let backdrop: Backdrop | null = null;
+  let shown = 0; // version
+  const mesh = makeMesh(of.file, least, () => {
+    if (!mesh.isInitialized || of.version === shown) return;
+    shown = of.version;
+    backdrop ??= new Backdrop(mesh, least);
+    backdrop.thin(of.share);
+  });
+  return mesh;
+}
+
+/** @param onFrame called before each picture */
+function makeMesh({ name, bytes }: SplatFile, least: { value: number }, onFrame?: () => void): SplatMesh {
+  const mesh = new SplatMesh({ fileBytes: bytes.slice(0), fileName: name, objectModifier: thinner(least), ...(onFrame ? { onFrame } : {}) });
+  if (isTurned({ name, bytes })) mesh.quaternion.set(1, 0, 0, 0);
+  return mesh;
 }
 
 /** Lets a splat vanish whose opacity times its two larger scales is under a limit. */

@@ -1,29 +1,36 @@
 import * as THREE from 'three';
-import { atEnd } from '../lifetime.ts';
-import type { Painter, PainterPorts } from '../soft/contract.ts';
+import { atEnd } from '../../lifetime.ts';
+import { Generator } from '../../gaussians/generator.ts';
+import type { Easel, Painter, PainterPorts } from '../../soft/contract.ts';
+import { nameOf } from '../../soft/graphics.ts';
 import { watchContext } from './context.ts';
 import { Sorter } from './sorter.ts';
 
 const POLL = 5; // ms
 
+/** What Spark draws of a generator; some must be read from a file before. */
+export type Twin = THREE.Object3D & { initialized?: Promise<unknown> };
+
 /** Draws with Spark, by the GPU. */
 export class SparkPainter implements Painter {
+  readonly path = 'webgl';
   readonly renderer: THREE.WebGLRenderer;
   readonly busy = false; // the GPU waits by itself
-  private readonly scene: THREE.Scene;
-  private readonly background: readonly [number, number, number];
-  private readonly transparent: boolean;
+  readonly refines = false; // where software draws, one fine picture takes as long as all that it would follow
+  private readonly easel: Easel;
   private readonly ports: PainterPorts;
   private readonly ending = new AbortController();
+  private readonly makeTwin: (generator: Generator) => Twin;
+  private readonly twins = new Map<Generator, Twin>();
   private current: Sorter;
 
-  /** @param transparent what is behind the canvas is seen around the avatar */
-  constructor(canvas: HTMLCanvasElement, scene: THREE.Scene, background: readonly [number, number, number], transparent: boolean, ports: PainterPorts) {
-    this.scene = scene;
-    this.background = background;
-    this.transparent = transparent;
+  /** @param makeTwin makes what Spark draws of a generator */
+  constructor(easel: Easel, ports: PainterPorts, makeTwin: (generator: Generator) => Twin) {
+    const { canvas, transparent: alpha } = easel;
+    this.easel = easel;
     this.ports = ports;
-    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: transparent, antialias: false, powerPreference: 'high-performance' });
+    this.makeTwin = makeTwin;
+    this.renderer = new THREE.WebGLRenderer({ canvas, alpha, antialias: false, powerPreference: 'high-performance' });
     this.current = this.prepare();
     watchContext(canvas, { lost: () => this.lose(), restored: () => this.restore(), gone: () => ports.gone() }, this.ending.signal);
     atEnd(this.ending.signal, () => this.current.dispose());
@@ -32,6 +39,10 @@ export class SparkPainter implements Painter {
   /** What draws the Gaussians; another one after the WebGL context was lost. */
   get spark(): Sorter {
     return this.current;
+  }
+
+  get name(): string {
+    return nameOf(this.renderer.getContext());
   }
 
   get pixels(): [number, number] {
@@ -69,12 +80,13 @@ export class SparkPainter implements Painter {
     else this.renderer.setAnimationLoop(frame);
   }
 
-  fit(width: number, height: number, ratio: number): void {
-    this.renderer.setPixelRatio(ratio);
+  fit(width: number, height: number, ratio: number, share: number): void {
+    this.renderer.setPixelRatio(ratio * share);
     this.renderer.setSize(width, height, false);
   }
 
   paint(scene: THREE.Scene, camera: THREE.PerspectiveCamera, immersed: boolean): void {
+    this.pair(scene);
     this.current.sift();
     this.current.autoUpdate = !immersed;
     if (immersed) this.gather(scene, camera);
@@ -82,17 +94,36 @@ export class SparkPainter implements Painter {
   }
 
   async settle(scene: THREE.Scene, camera: THREE.PerspectiveCamera): Promise<void> {
+    this.pair(scene);
+    for (const { initialized } of this.twins.values()) await initialized;
     await this.sorted(); // a sort of the picture before may still run
     await this.current.update({ scene, camera });
     await this.sorted();
   }
 
-  async shown(): Promise<void> {}
+  /** Waits for the GPU. */
+  async shown(): Promise<void> {
+    const gl = this.renderer.getContext();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
 
   dispose(): void {
+    this.loop(null);
     this.ending.abort();
+    for (const twin of this.twins.values()) twin.removeFromParent();
+    this.easel.scene.remove(this.current);
     this.renderer.dispose();
     this.renderer.forceContextLoss();
+  }
+
+  /** Gives generators that are new on stage what Spark draws of them. */
+  private pair(scene: THREE.Scene): void {
+    for (const generator of scene.children) {
+      if (!(generator instanceof Generator) || this.twins.has(generator)) continue;
+      const twin = this.makeTwin(generator);
+      this.twins.set(generator, twin);
+      generator.add(twin);
+    }
   }
 
   /** In headsets Spark would take what people look like after the picture, for the next one: late by one. */
@@ -107,17 +138,18 @@ export class SparkPainter implements Painter {
 
   /** Colours and Spark, for a context that is new. */
   private prepare(): Sorter {
+    const { background, transparent, scene } = this.easel;
     // Both sRGB: colours of the bundle are display values and are blended as they are.
-    this.renderer.setClearColor(new THREE.Color().setRGB(...this.background, THREE.SRGBColorSpace), this.transparent ? 0 : 1);
+    this.renderer.setClearColor(new THREE.Color().setRGB(...background, THREE.SRGBColorSpace), transparent ? 0 : 1);
     const spark = new Sorter(this.renderer, () => this.ports.dirty());
-    this.scene.add(spark);
+    scene.add(spark);
     return spark;
   }
 
   /** What Spark had made of the actors is lost with the context, and so is a sort that was reading it. */
   private lose(): void {
     this.ports.lost();
-    this.scene.remove(this.current);
+    this.easel.scene.remove(this.current);
     this.current.dispose();
   }
 

@@ -1,0 +1,135 @@
+import { dyno } from '@sparkjsdev/spark';
+import * as THREE from 'three';
+import type { HeadRows } from '../bundle/baked-head.ts';
+import { SparkTwin } from '../gaussians/spark.ts';
+import type { HeadGenerator } from './generator.ts';
+
+const WIDTH = 1024; // texels per row: one texel is one Gaussian
+const REST_LAYERS = 4; // centre + basis scale, quaternion, scales, mean logits
+const PACKED = 4; // basis vectors in a texel: a fetch costs far more than taking them apart
+
+/** The head as Spark draws it: a shader makes Gaussian i from textures and K coefficients; no opacity is ever 0 (sigmoid). */
+export class SparkHead extends SparkTwin {
+  constructor(head: HeadGenerator) {
+    const [first] = head.parts;
+    const { rank, count } = first!;
+    const texels = makeTexels(head.numSplats, rank);
+    const grown = { value: head.grown };
+    let filled = 0; // parts
+    let gaussians = 0;
+    const follow = () => {
+      grown.value = head.grown;
+      for (const part of head.parts.slice(filled)) {
+        fill(texels, part, gaussians);
+        gaussians += part.count;
+        filled++;
+      }
+    };
+    const uniforms = {
+      headRest: { value: texels.rest },
+      headBasis: { value: texels.basis },
+      headCoefficients: { value: head.shown },
+      headFirst: { value: count },
+      headGrown: grown,
+    };
+    super(head, { declarations: declarations(rank), uniforms, statements: (index, gsplat) => statements(rank, index, gsplat) }, follow);
+  }
+}
+
+function declarations(rank: number): string {
+  return dyno.unindent(`
+    uniform sampler2DArray headRest;
+    uniform usampler2DArray headBasis;
+    uniform float headCoefficients[${rank}];
+    uniform int headFirst;
+    uniform float headGrown;
+    vec4 headVector(uvec4 four, int left) {
+      return vec4(ivec4(four << left) >> 24);
+    }
+  `);
+}
+
+/** logits = mean + scale · Σ c·U; rgb, opacity = sigmoid(logits). */
+function statements(rank: number, index: string, gsplat: string): string[] {
+  const fetches = Array.from(
+    { length: Math.ceil(rank / PACKED) },
+    (_, i) => `uvec4 u${i} = texelFetch(headBasis, ivec3(texel, ${i}), 0);`,
+  );
+  const terms = Array.from(
+    { length: rank },
+    (_, k) => `headCoefficients[${k}] * headVector(u${Math.floor(k / PACKED)}, ${24 - 8 * (k % PACKED)})`,
+  );
+  return dyno.unindentLines(`
+    ${gsplat}.flags = 0u;
+    ${gsplat}.index = ${index};
+    float grown = ${index} < headFirst ? 1.0 : headGrown;
+    if (grown > 0.0) {
+      ivec2 texel = ivec2(${index} % ${WIDTH}, ${index} / ${WIDTH});
+      vec4 centreAndScale = texelFetch(headRest, ivec3(texel, 0), 0);
+      ${fetches.join(' ')}
+      vec4 blend = ${terms.join(' + ')};
+      vec4 logits = texelFetch(headRest, ivec3(texel, 3), 0) + centreAndScale.w * blend;
+      ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
+      ${gsplat}.center = centreAndScale.xyz;
+      ${gsplat}.quaternion = texelFetch(headRest, ivec3(texel, 1), 0);
+      ${gsplat}.scales = texelFetch(headRest, ivec3(texel, 2), 0).xyz;
+      ${gsplat}.rgba = 1.0 / (1.0 + exp(-logits));
+      ${gsplat}.rgba.a *= grown;
+    }
+  `);
+}
+
+/** Textures of a fixed number of Gaussians, one texel each. */
+interface Texels {
+  rest: THREE.DataArrayTexture;
+  basis: THREE.DataArrayTexture; // r, g, b, opacity, each number with a byte of four basis vectors
+}
+
+function makeTexels(capacity: number, rank: number): Texels {
+  const rows = Math.ceil(capacity / WIDTH);
+  const layer = 4 * WIDTH * rows;
+  const layers = Math.ceil(rank / PACKED);
+  const rest = new THREE.DataArrayTexture(new Float32Array(REST_LAYERS * layer), WIDTH, rows, REST_LAYERS);
+  rest.type = THREE.FloatType;
+  rest.internalFormat = 'RGBA32F';
+  const basis = new THREE.DataArrayTexture(new Uint32Array(layers * layer), WIDTH, rows, layers);
+  basis.format = THREE.RGBAIntegerFormat;
+  basis.type = THREE.UnsignedIntType;
+  basis.internalFormat = 'RGBA32UI';
+  return { rest, basis };
+}
+
+/** Writes Gaussians from number `begin` on. */
+function fill({ rest, basis }: Texels, rows: HeadRows, begin: number): void {
+  fillRest(rest.image.data as Float32Array, rest.image.height, rows, begin);
+  fillBasis(basis.image.data as Uint32Array, basis.image.height, rows, begin);
+  rest.needsUpdate = basis.needsUpdate = true;
+}
+
+function fillRest(texels: Float32Array, height: number, rows: HeadRows, begin: number): void {
+  const { count, means, quats, scales, meanLogits, basisScale } = rows;
+  const layer = 4 * WIDTH * height;
+  for (let i = 0; i < count; i++) {
+    const [w, x, y, z] = quats.subarray(4 * i);
+    const s = scales.subarray(3 * i);
+    const at = 4 * (begin + i);
+    texels.set([means[3 * i]!, means[3 * i + 1]!, means[3 * i + 2]!, basisScale[i]!], at);
+    texels.set(normalised(x!, y!, z!, w!), layer + at); // Spark: xyzw
+    texels.set([Math.exp(s[0]!), Math.exp(s[1]!), Math.exp(s[2]!), 0], 2 * layer + at);
+    texels.set(meanLogits.subarray(4 * i, 4 * i + 4), 3 * layer + at);
+  }
+}
+
+function fillBasis(texels: Uint32Array, height: number, { count, rank, basis }: HeadRows, begin: number): void {
+  const layer = 4 * WIDTH * height;
+  const bytes = new Int8Array(texels.buffer); // little-endian, as every device with WebGL is
+  for (let k = 0; k < rank; k++) {
+    const first = PACKED * (Math.floor(k / PACKED) * layer + 4 * begin) + (k % PACKED);
+    for (let i = 0; i < 4 * count; i++) bytes[first + PACKED * i] = basis[4 * count * k + i]!;
+  }
+}
+
+function normalised(...q: [number, number, number, number]): number[] {
+  const length = Math.hypot(...q);
+  return q.map((value) => value / length);
+}

@@ -1,0 +1,23 @@
+import { readPly } from './ply.ts';
+import { readSpz } from './spz.ts';
+
+/** A file of splats. */
+export interface SplatFile {
+  name: string; // which tells the format
+  bytes: ArrayBuffer;
+}
+
+/** Whether the splats of a file have the axes of SPZ: turned by half around x, they have those of all else. */
+export function isTurned({ name }: SplatFile): boolean {
+  return name.endsWith('.spz');
+}
+
+/**
+ * Reads splats: a row of a source that stands still (`soft/source.ts`) for each, in the order of the
+ * file and with the axes of the world. Seen from everywhere they have the colour of their mean.
+ *
+ * @returns null for a kind that only Spark reads: compressed PLY, SPZ of version 4
+ */
+export async function readSplats(file: SplatFile): Promise<Float32Array | null> {
+  return isTurned(file) ? readSpz(file.bytes) : readPly(file.bytes);
+}

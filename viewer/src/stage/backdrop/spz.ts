@@ -1,0 +1,64 @@
+import { colourOf, NUMBERS } from './rows.ts';
+
+const GZIP = 0x8b1f;
+const MAGIC = 0x5053474e; // NGSP
+const HEADER = 16; // bytes
+const COLOUR_SCALE = 0.15;
+const SMALL = Math.SQRT1_2 / 511; // step of a quaternion's smaller components: 9 bits for up to √½
+
+/**
+ * Reads an SPZ file of version 2 or 3: a gzip stream of one table after the other.
+ *
+ * @returns rows as `readSplats` gives them; null if it is of another kind, or damaged
+ */
+export async function readSpz(bytes: ArrayBuffer): Promise<Float32Array | null> {
+  if (bytes.byteLength < 2 || new DataView(bytes).getUint16(0, true) !== GZIP) return null;
+  const unpacked = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))).arrayBuffer().catch(() => null);
+  if (!unpacked || unpacked.byteLength < HEADER) return null;
+  const data = new DataView(unpacked);
+  const [magic, version, count] = [0, 4, 8].map((at) => data.getUint32(at, true)) as [number, number, number];
+  const turning = version === 2 ? 3 : 4; // bytes of a rotation
+  if (magic !== MAGIC || (version !== 2 && version !== 3) || unpacked.byteLength < HEADER + count * (16 + turning)) return null;
+  const step = 2 ** -data.getUint8(13); // m
+  const [alphas, colours, scales, rotations] = [9, 10, 13, 16].map((before) => HEADER + before * count) as [number, number, number, number];
+  const rows = new Float32Array(NUMBERS * count);
+  for (let i = 0; i < count; i++) {
+    const row = rows.subarray(NUMBERS * i, NUMBERS * (i + 1));
+    for (let k = 0; k < 3; k++) {
+      const place = HEADER + 9 * i + 3 * k;
+      row[k] = step * (data.getUint16(place, true) | (data.getInt8(place + 2) << 16));
+      row[7 + k] = Math.exp(data.getUint8(scales + 3 * i + k) / 16 - 10);
+      row[10 + k] = colourOf((data.getUint8(colours + 3 * i + k) / 255 - 0.5) / COLOUR_SCALE);
+    }
+    row[13] = data.getUint8(alphas + i) / 255;
+    const turn = version === 2 ? vectorTurn(data, rotations + 3 * i) : packedTurn(data.getUint32(rotations + 4 * i, true));
+    // By half around x: y and z change their signs, of places and of axes.
+    row[1] = -row[1]!;
+    row[2] = -row[2]!;
+    row.set([turn[3]!, turn[0]!, -turn[1]!, -turn[2]!], 3);
+  }
+  return rows;
+}
+
+/** A rotation xyzw of three bytes; w is what is missing, and positive. */
+function vectorTurn(data: DataView, at: number): number[] {
+  const vector = [0, 1, 2].map((k) => data.getUint8(at + k) / 127.5 - 1);
+  return [...vector, missing(vector)];
+}
+
+/** A rotation xyzw of a word: which component is the largest, and the three others. */
+function packedTurn(word: number): number[] {
+  const largest = word >>> 30;
+  const turn = [0, 0, 0, 0];
+  for (let k = 3; k >= 0; k--) {
+    if (k === largest) continue;
+    turn[k] = (word & 511) * SMALL * (word & 512 ? -1 : 1);
+    word >>>= 10;
+  }
+  turn[largest] = missing(turn);
+  return turn;
+}
+
+function missing(others: readonly number[]): number {
+  return Math.sqrt(Math.max(0, 1 - others.reduce((sum, value) => sum + value * value, 0)));
+}

@@ -1,0 +1,31 @@
+import { readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { afterEach, expect, test, vi } from 'vitest';
+import { remember, remembered } from '../src/remembered.ts';
+
+const SOURCES = join(import.meta.dirname, '../src');
+
+afterEach(() => void vi.unstubAllGlobals());
+
+test('a choice is remembered', () => {
+  const kept = new Map<string, string>();
+  vi.stubGlobal('localStorage', { getItem: (key: string) => kept.get(key) ?? null, setItem: (key: string, value: string) => kept.set(key, value) });
+  expect(remembered('theme')).toBeNull();
+  remember('theme', 'light');
+  expect([remembered('theme'), [...kept]]).toEqual(['light', [['ico3d-theme', 'light']]]);
+});
+
+test('where the browser keeps nothing, the page goes on without, and asks for it nowhere else', () => {
+  vi.stubGlobal('localStorage', undefined);
+  Object.defineProperty(globalThis, 'localStorage', {
+    configurable: true,
+    get() {
+      throw new DOMException('refused', 'SecurityError');
+    },
+  });
+  expect(remembered('theme')).toBeNull();
+  expect(() => remember('theme', 'light')).not.toThrow();
+  const files = readdirSync(SOURCES, { recursive: true, encoding: 'utf8' }).filter((file) => file.endsWith('.ts'));
+  const users = files.filter((file) => readFileSync(join(SOURCES, file), 'utf8').includes('localStorage'));
+  expect(users).toEqual(['remembered.ts']);
+});

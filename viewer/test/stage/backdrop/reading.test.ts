@@ -1,0 +1,91 @@
+import { gzipSync } from 'node:zlib';
+import { describe, expect, test } from 'vitest';
+import { readSplats } from '../../../src/stage/backdrop/file.ts';
+import { makeStillBackdrop, StillGenerator } from '../../../src/stage/backdrop/still.ts';
+
+const HARMONIC = 0.28209479177387814;
+const COLUMNS = ['x', 'y', 'z', 'nx', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3'];
+
+/** A PLY file of rows in the order of `COLUMNS`. */
+function ply(rows: number[][], columns = COLUMNS, format = 'binary_little_endian'): ArrayBuffer {
+  const header = ['ply', `format ${format} 1.0`, 'comment of nobody', `element vertex ${rows.length}`, ...columns.map((name) => `property float ${name}`), 'end_header', ''].join('\n');
+  const floats = new Uint8Array(Float32Array.from(rows.flat()).buffer);
+  return Uint8Array.from([...new TextEncoder().encode(header), ...floats]).buffer;
+}
+
+/** An SPZ file of tables of bytes, with positions in 4096ths. */
+function spz(version: number, count: number, tables: number[][], pack: (bytes: Uint8Array) => Uint8Array = gzipSync): ArrayBuffer {
+  const header = new DataView(new ArrayBuffer(16));
+  for (const [i, word] of [0x5053474e, version, count].entries()) header.setUint32(4 * i, word, true);
+  header.setUint8(13, 12);
+  return new Uint8Array(pack(Uint8Array.from([...new Uint8Array(header.buffer), ...tables.flat()]))).buffer;
+}
+
+const word = (value: number) => [value, value >>> 8, value >>> 16, value >>> 24].map((byte) => byte & 255);
+const fixed = (value: number) => word(value).slice(0, 3);
+
+/** Rows that were read, without what nobody reads behind them. */
+async function rowsOf(name: string, bytes: ArrayBuffer): Promise<number[][] | null> {
+  const rows = await readSplats({ name, bytes });
+  return rows && Array.from({ length: rows.length / 16 }, (_, i) => [...rows.subarray(16 * i, 16 * i + 14)]);
+}
+
+function expectRow(found: number[], expected: number[]): void {
+  for (const [k, value] of expected.entries()) expect(found[k], `number ${k}`).toBeCloseTo(value, 6);
+}
+
+describe('splats behind a person', () => {
+  test('are read from PLY', async () => {
+    const rows = await rowsOf('background.ply', ply([[1, 2, 3, 9, 0, 1, -9, 0, 0, -1, Math.log(2), 0.5, -0.5, 0.5, 0.5], Array(15).fill(0)]));
+    expect(rows).toHaveLength(2);
+    expectRow(rows![0]!, [1, 2, 3, 0.5, -0.5, 0.5, 0.5, 1, Math.exp(-1), 2, 0.5, 0.5 + HARMONIC, 0, 0.5]);
+    expectRow(rows![1]!, [0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0.5, 0.5, 0.5, 0.5]);
+  });
+
+  test('are read from SPZ and turned to the axes of the world', async () => {
+    const half = Math.SQRT1_2 / 511;
+    const shared = [
+      [...fixed(4096), ...fixed(-2048), ...fixed(1), ...fixed(-8388608), ...fixed(0), ...fixed(-1)],
+      [255, 51],
+      [255, 0, 51, 51, 51, 51],
+      [160, 112, 160, 176, 160, 160],
+    ];
+    const colours = (byte: number) => Math.max(0, 0.5 + (HARMONIC * (byte / 255 - 0.5)) / 0.15);
+    const turned = (100 << 20) | ((512 + 200) << 10) | 511; // x is the largest
+    const rows = await rowsOf('background.spz', spz(3, 2, [...shared, [...word(3 << 30), ...word(turned)]]));
+    expectRow(rows![0]!, [1, 0.5, -(2 ** -12), 1, 0, 0, 0, 1, Math.exp(-3), 1, colours(255), colours(0), colours(51), 1]);
+    const x = Math.sqrt(1 - half ** 2 * (100 ** 2 + 200 ** 2 + 511 ** 2));
+    expectRow(rows![1]!, [-2048, 0, 2 ** -12, Math.SQRT1_2, x, -100 * half, 200 * half, Math.E, 1, 1, colours(51), colours(51), colours(51), 0.2]);
+    const older = await rowsOf('background.spz', spz(2, 2, [...shared, [255, 127, 127, 0, 127, 128]]));
+    const small = 1 / 255;
+    expectRow(older![0]!.slice(3, 7), [0, 1, small, small]); // nothing is left for w
+    expectRow(older![1]!.slice(3, 7), [0, -1, small, -small]);
+  });
+
+  test('are left to Spark where the file is of another kind', async () => {
+    const row = Array<number>(15).fill(0);
+    expect(await rowsOf('background.ply', ply([row], [...COLUMNS.slice(0, -1), 'red']))).toBeNull();
+    expect(await rowsOf('background.ply', ply([row], COLUMNS, 'binary_big_endian'))).toBeNull();
+    expect(await rowsOf('background.ply', ply([row]).slice(0, -1))).toBeNull();
+    expect(await rowsOf('background.ply', new ArrayBuffer(3))).toBeNull();
+    expect(await rowsOf('background.spz', spz(4, 0, []))).toBeNull();
+    expect(await rowsOf('background.spz', spz(4, 0, [], (bytes) => bytes))).toBeNull();
+    expect(await rowsOf('background.spz', spz(3, 1, [Array(19).fill(0)]))).toBeNull(); // a byte is missing
+    expect(await rowsOf('background.spz', spz(3, 1, [Array(20).fill(0)]).slice(0, -9))).toBeNull();
+    expect(await makeStillBackdrop({ name: 'background.ply', bytes: new ArrayBuffer(3) })).toBeNull();
+  });
+
+  test('are drawn the largest ones first, and a share of them where pictures take too long', async () => {
+    const sizes = [0.1, 0.4, 0.2, 0.3];
+    const rows = sizes.map((size) => [size, 0, 0, 0, 0, 0, 0, 0, Math.log(size), Math.log(size), -9, 1, 0, 0, 0]);
+    const backdrop = (await makeStillBackdrop({ name: 'background.ply', bytes: ply(rows) }))!;
+    const generator = backdrop.objects[0] as StillGenerator;
+    const places = new Float32Array(generator.soft.source!.rows).filter((_, at) => at % 16 === 0);
+    expect([...places]).toEqual([0.4, 0.3, 0.2, 0.1].map(Math.fround));
+    expect(generator.soft.drawn).toBe(4);
+    const { version } = generator;
+    backdrop.thin!(0.3);
+    expect(generator.soft.drawn).toBe(2);
+    expect(generator.version).toBeGreaterThan(version);
+  });
+});
