@@ -6,10 +6,13 @@ export ICO3D_PYTHON := $(CURDIR)/$(PY)
 # importing takes three times as long where every process compiles what it imports
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test quick quick-unit install viewer lint strict page unit e2e e2e-beside e2e-alone bench clean
+.PHONY: demo demo-natural test quick quick-unit install viewer lint strict page unit e2e e2e-beside e2e-alone bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
+
+demo-natural: $(VENV)/.serve src/ico3d/chat/static/index.html ## the same with Whisper, a small language model and a natural voice
+	$(VENV)/bin/ico3d demo --natural
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
@@ -42,8 +45,9 @@ page: src/ico3d/chat/static/index.html
 	cd viewer && $(ASIDE) npm run --silent check && $(ASIDE) npm run --silent test
 
 unit: $(VENV)/.develop $(VENV)/.kernels src/ico3d/chat/static/index.html
-	# four files at a time on two cores: talking with an avatar is mostly waiting
-	$(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder --durations 15
+	# three files at a time on two cores: talking with an avatar is mostly waiting, and each more process
+	# takes five seconds of a core to import and collect
+	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
 
 e2e: e2e-beside e2e-alone ## the page in a real browser
 
@@ -79,7 +83,7 @@ $(VENV)/.serve: pyproject.toml constraints.txt scripts/setup.sh | $(VENV)/.node
 $(VENV)/.develop: pyproject.toml constraints.txt scripts/setup.sh | $(VENV)/.node
 	scripts/setup.sh develop
 
-KERNELS := $(shell grep -rlE --include=*.py '^@(kernel|njit)' src)
+KERNELS := $(shell grep -rlE --include=*.py '^@(kernel|njit|subroutine)' src)
 $(VENV)/.kernels: $(VENV)/.develop $(KERNELS)
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONPATH=tests $(ASIDE) $(PY) -m support.compile_kernels >/dev/null
 	touch $@

@@ -102,7 +102,7 @@ class Ear(FrameProcessor):
 
 async def spoken(answer: str, speed: float, pieces: FrameProcessor) -> tuple[float, float]:
     """Seconds from the question to the first sound, and of the gap behind the first piece."""
-    ear, voice = Ear(), PieceVoice("en-us", partial(espeak.spoken, voice="en-us", rate=165))
+    ear, voice = Ear(), PieceVoice("en-us", partial(espeak.speak, voice="en-us", rate=165))
     worker = PipelineWorker(
         Pipeline([ScriptedModel(answer, speed), pieces, voice, ear]),
         params=PipelineParams(audio_out_sample_rate=SPEECH_RATE),

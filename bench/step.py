@@ -3,7 +3,7 @@
     python bench/step.py CAPTURE --json step.json
 
 Blendshapes, the CPU preset, as many Gaussians as `--gaussians`, from the first step on; with
-`--close-ups 2` the two crops of the mouth that the preset has, too. Run it with
+`--close-ups 4` the four crops of the mouth that the preset has, too. Run it with
 PYTHONPATH at another version of the sources to compare. Parts are self times of the named kernels;
 what is left is the basis' optimiser, which torch does not see, and small operations.
 """

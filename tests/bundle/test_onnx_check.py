@@ -88,6 +88,15 @@ def test_other_inputs_and_outputs_are_refused(model, part):
     refused(model, "'mel' to 'expression'")
 
 
+def test_a_second_input_needs_its_name_and_a_value_of_its_own(model):
+    model.graph.input.append(helper.make_tensor_value_info("told", TensorProto.FLOAT, [None, 6]))
+    refused(model, "'mel' to 'expression'")
+    model.graph.initializer.append(numpy_helper.from_array(np.zeros((1, 6), np.float32), "told"))
+    check(model.SerializeToString())
+    model.graph.input[1].name = model.graph.initializer[-1].name = "other"
+    refused(model, "'mel' to 'expression'")
+
+
 @settings(max_examples=300)
 @given(st.binary(max_size=60) | st.integers(0, len(GRAPH) - 1).map(lambda n: GRAPH[:n]))
 def test_garbage_is_refused(data):

@@ -8,7 +8,7 @@ HEAD = (
     "--density.every 6 --network.hidden 16 --network.features 8"
 )
 BODY = (
-    "--steps-per-frame 5 --warmup-steps 6 --finetune.steps 6 --joining.color-steps 6 "
+    "--steps-per-frame 5 --warmup-steps 6 --finetune.steps 6 "
     "--initial.gaussians 300 --density.max-gaussians 400 --joining.border-points 60 "
     "--density.begin 10 --encoder.space 8"
 )

@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 import torch
-from numba import njit, prange
+from numba import prange
 from torch import Tensor
 
+from ico3d.splat.cpu.compile import kernel
 from ico3d.training.finite import check_gradient
 
 BETA1 = 0.9
@@ -100,7 +101,7 @@ def adam_reference(
     value.addcdiv_(first, denominator, value=-rate * float(corrections[0]))
 
 
-@njit(parallel=True, fastmath=True, cache=True)
+@kernel(parallel=True)
 def adam_kernel(value, first, second, gradient, rate, first_correction, second_correction):
     """One Adam step over flat float32 arrays, in place.
 

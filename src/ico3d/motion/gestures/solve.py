@@ -231,7 +231,7 @@ def _lift(person: Person, side: str, wrist: Array) -> Array:
 
 def _pushed(person: Person, side: str, arm: _Arm, rotations: Array) -> Array:
     """(F, 3) positions of the wrist, moved so that hand and forearm are outside trunk and head."""
-    wrist = arm.wrist.copy()
+    wrist: Array = arm.wrist.copy()
     along = rotate(arm.hand, DOWN)  # (F, 3) in the chest's axes
     length, radius = person.hand(side), person.thickness.arm * person.height
     shoulder = person.place(f"{side}_shoulder")
@@ -245,6 +245,11 @@ def _pushed(person: Person, side: str, arm: _Arm, rotations: Array) -> Array:
             (wrist + length * along, 0.7 * radius),
             (wrist + TIPS * length * along, 0.2 * radius),
         ):
-            out = way_out_of_trunk(person, point, thick)
-            wrist = wrist + out + way_out_of_head(person, point + out, thick)
+            wrist = _way_out(person, wrist, point, thick)
     return wrist
+
+
+def _way_out(person: Person, wrist: Array, point: Array, thick: float) -> Array:
+    """(F, 3) positions of the wrist moved by the way of a point out of trunk and head."""
+    out = way_out_of_trunk(person, point, thick)
+    return wrist + out + way_out_of_head(person, point + out, thick)
