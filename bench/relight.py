@@ -162,7 +162,8 @@ def scores(
     pairs = list(zip(drawn, looks, strict=True))
     errors = [np.square(d - k.truth)[k.inside].mean() for d, k in pairs]
     steps = [np.linalg.norm((d - k.truth)[_rim(k)].mean(0)) for d, k in pairs]
-    spots = [_blotch(*both, look.inside) for *both, look in zip(drawn, before, looks, strict=True)]
+    trios = zip(drawn, before, looks, strict=True)
+    spots = [_blotch(there, here, look.inside) for there, here, look in trios]
     found = {"face": _db(errors), "step": np.mean(steps), "blotch": np.mean(spots)}
     fine = [(_fine(d)[k.inside], _fine(k.truth)[k.inside]) for d, k in pairs]
     found["detail"] = np.mean([np.corrcoef(*both)[0, 1] for both in fine])

@@ -92,7 +92,7 @@ def test_the_packaged_avatar_is_served(installed, tmp_path):
             assert script is not None, "the page has no script"
             drawing = re.findall(r'rel="modulepreload"[^>]* href="\.?/?(assets/[^"]+\.js)"', page)
             scripts = [fetched(f"{url[0]}/{name}") for name in (script[1], *drawing)]
-            assert sum(map(len, scripts)) > 1_000_000, "what draws is missing"
+            assert sum(map(len, scripts)) > 300_000, "what draws is missing"
             manifest = json.loads(fetched(f"{url[0]}/bundle/manifest.json"))
             assert manifest["format"] == "ico3d-bundle"
         finally:

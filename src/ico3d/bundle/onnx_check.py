@@ -76,7 +76,7 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
 
 def _check_graph(graph: memoryview, name: str, input_name: str, output_name: str) -> None:
     names: dict[int, list[str]] = {_INPUT: [], _OUTPUT: []}
-    weights = set()
+    weights: set[str] = set()
     for field, value in _fields(graph):
         if field == _NODE:
             _check_node(_bytes(value), name)
