@@ -1,6 +1,6 @@
 """Does bad input end in one sentence, soon, and in little memory, whatever reads it?
 
-    python bench/fuzz.py [--inputs 10000] [--only NAME …] [--json F]
+    python bench/fuzz [--inputs 10000] [--only NAME …] [--json F]
 
 Sound files of every kind are damaged: bytes, values of JSON, tensors, datasets of HDF5, claims of
 headers, checksums made right again. Each damaged input is read in a process with bounds on time and
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ico3d.cli import run_script
 
-TESTS = Path(__file__).parents[1] / "tests"
+BENCH = Path(__file__).parents[1]
 
 
 @dataclass
@@ -46,10 +46,11 @@ class Fuzz:
 
     def run(self) -> int:
         """Measures each reader and prints a table."""
-        sys.path.append(str(TESTS))  # the writers of sound files are those of the tests
-        from fuzzing.bounds import Bounds, measure
-        from fuzzing.readers import chosen
-        from fuzzing.report import keep, say, table
+        # the writers of sound files are those of the tests
+        sys.path += [str(BENCH), str(BENCH.parent / "tests")]
+        from fuzz.bounds import Bounds, measure
+        from fuzz.readers import chosen
+        from fuzz.report import keep, say, table
 
         outcomes = {}
         for reader in chosen(self.only):

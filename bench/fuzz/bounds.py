@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
-from fuzzing.reader import Bench, Reader
+from fuzz.reader import Bench, Reader
 
 KILLED = {
     signal.SIGPROF: "too much processor time",

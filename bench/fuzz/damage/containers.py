@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from fuzzing.damage.raw import COUNTS, changed_bytes
-from fuzzing.damage.values import changed_tree, json_text
+from fuzz.damage.raw import COUNTS, changed_bytes
+from fuzz.damage.values import changed_tree, json_text
 
 Inner = Callable[[str, bytes, Random], bytes]
 """Damages a file within a file by its name."""

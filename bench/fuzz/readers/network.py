@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fuzzing.reader import Reader
-from fuzzing.readers.requests import REQUESTS, serving
+from fuzz.reader import Reader
+from fuzz.readers.requests import REQUESTS, serving
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import decode_client, decode_server, encode
 from ico3d.common.typed import field_types, kind_of

@@ -3,8 +3,8 @@
 import warnings
 from pathlib import Path
 
-from fuzzing.reader import Reader
-from fuzzing.readers import samples
+from fuzz.reader import Reader
+from fuzz.readers import samples
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.persona import read_persona
 from ico3d.bundle.skinned.gestures import gesture_files

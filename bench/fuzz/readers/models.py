@@ -4,7 +4,7 @@ from pathlib import Path
 
 import torch
 
-from fuzzing.reader import Reader
+from fuzz.reader import Reader
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.models import open_model
 from ico3d.body.model_folder import TrainedBody, save_window

@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from fuzzing.bounds import Outcome, input_of
-from fuzzing.reader import Bench, Reader
+from fuzz.bounds import Outcome, input_of
+from fuzz.reader import Bench, Reader
 
 COLUMNS = ("reader", "inputs", "read", "refused", "findings", "ms each", "longest, s", "most, MiB")
 

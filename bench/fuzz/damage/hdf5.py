@@ -6,7 +6,7 @@ from random import Random
 import h5py
 import numpy as np
 
-from fuzzing.damage.raw import changed_bytes
+from fuzz.damage.raw import changed_bytes
 
 
 def changed_hdf5(data: bytes, random: Random) -> bytes:

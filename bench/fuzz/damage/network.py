@@ -5,8 +5,8 @@ import re
 import struct
 from random import Random
 
-from fuzzing.damage.raw import changed_bytes, changed_lines
-from fuzzing.damage.values import changed_tree, json_text
+from fuzz.damage.raw import changed_bytes, changed_lines
+from fuzz.damage.values import changed_tree, json_text
 
 NAMES = ("Host", "Origin", "Content-Length", "Content-Type", "Accept-Encoding", "If-None-Match")
 NAMES += (

@@ -4,7 +4,7 @@ import json
 import tomllib
 from random import Random
 
-from fuzzing.damage.containers import (
+from fuzz.damage.containers import (
     changed_gzip,
     changed_npy,
     changed_png,
@@ -12,10 +12,10 @@ from fuzzing.damage.containers import (
     changed_wav,
     changed_zip,
 )
-from fuzzing.damage.hdf5 import changed_hdf5
-from fuzzing.damage.network import changed_frame, changed_request
-from fuzzing.damage.raw import changed_bytes, changed_lines
-from fuzzing.damage.values import changed_tree, json_text, toml_text
+from fuzz.damage.hdf5 import changed_hdf5
+from fuzz.damage.network import changed_frame, changed_request
+from fuzz.damage.raw import changed_bytes, changed_lines
+from fuzz.damage.values import changed_tree, json_text, toml_text
 
 Files = dict[str, bytes]
 """Contents by path below a folder."""

@@ -12,7 +12,7 @@ from pipecat.frames.frames import Frame
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from fuzzing.readers.samples import write_wav
+from fuzz.readers.samples import write_wav
 from ico3d.bundle.format import Bundle
 from ico3d.chat.remote.app import make_service_app
 from ico3d.chat.remote.limits import Limits

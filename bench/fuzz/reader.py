@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
-from fuzzing.damage.files import Files, damaged
+from fuzz.damage.files import Files, damaged
 from ico3d.errors import Ico3dError
 
 LONGEST_SENTENCE = 1500

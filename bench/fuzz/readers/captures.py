@@ -3,8 +3,8 @@
 import shutil
 from pathlib import Path
 
-from fuzzing.reader import Reader
-from fuzzing.readers import samples
+from fuzz.reader import Reader
+from fuzz.readers import samples
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.recording import import_recording
 from ico3d.capture.importing.settings import ImportSettings

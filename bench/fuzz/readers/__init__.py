@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from fuzzing.reader import Reader
-from fuzzing.readers.captures import CAPTURES
-from fuzzing.readers.files import FILES
-from fuzzing.readers.models import MODELS
-from fuzzing.readers.network import NETWORK
+from fuzz.reader import Reader
+from fuzz.readers.captures import CAPTURES
+from fuzz.readers.files import FILES
+from fuzz.readers.models import MODELS
+from fuzz.readers.network import NETWORK
 from ico3d.errors import SettingsError
 
 READERS = (*CAPTURES, *FILES, *MODELS, *NETWORK)

@@ -1,1 +1,0 @@
-"""Damaged and hostile inputs for everything that reads: `python bench/fuzz.py`."""
