@@ -12,7 +12,7 @@ import { PAINTERS } from './painters/paths.ts';
 import { choosePath, rememberWish, wishOf, type Wish } from './stage/choosing.ts';
 import type { Drawing } from './stage/painting.ts';
 import type { Stage } from './stage/stage.ts';
-import { Conversation } from './talk/conversation.ts';
+import { Conversation, type ConversationView } from './talk/conversation.ts';
 import type { Emit } from './talk/events.ts';
 import { telling } from './talk/telling.ts';
 import { watchCover } from './ui/cover.ts';
@@ -27,6 +27,9 @@ import { say, type Sentence } from './words/text.ts';
 import { offerXr } from './xr/offer.ts';
 import type { Path } from './soft/contract.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
+
+/** States of a conversation in which an answer is worked out. */
+const AT_WORK: ReadonlySet<string> = new Set(['listening', 'thinking']);
 
 /** Who is there, once they can be seen. */
 export interface Presence extends Cast {
@@ -117,7 +120,7 @@ export class Visit {
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
     const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '' }, this.overlay, () => stage.figures, signal);
-    const conversation = manifest.head ? this.converse(page) : undefined;
+    const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };
     const corner = root.querySelector<HTMLElement>('.figures')!;
     corner.append(
@@ -167,8 +170,13 @@ export class Visit {
     this.root.dataset.path = stage.painter.path;
   }
 
-  private converse(page: Page): Conversation {
-    const conversation = new Conversation(() => this.server.socket(), telling(page.view, this.ports.emit), this.ports.emit);
+  private converse(page: Page, stage: Stage): Conversation {
+    const state: ConversationView['state'] = (state) => {
+      page.view.state(state);
+      stage.spare(AT_WORK.has(state));
+    };
+    const view = telling(Object.assign(Object.create(page.view) as ConversationView, { state }), this.ports.emit);
+    const conversation = new Conversation(() => this.server.socket(), view, this.ports.emit);
     atEnd(this.ending.signal, () => conversation.dispose());
     return conversation;
   }
