@@ -127,9 +127,10 @@ def is_own(host: str | None, origin: str | None, bound: str, names: Collection[s
         return False
     if origin is None:
         return True
-    if not origin.startswith(("http://", "https://")):
+    scheme, _, rest = origin.partition("://")
+    if scheme not in ("http", "https"):
         return False
-    origin_name, origin_port = split_host(urlsplit(origin).netloc)
+    origin_name, origin_port = split_host(rest)
     same_name = origin_name == name or {origin_name, name} <= LOOPBACK
     return same_name and origin_port == port
 

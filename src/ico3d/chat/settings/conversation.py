@@ -261,7 +261,7 @@ class SettingsRules(Rules):
     def unknown(self, where: Setting, name: str, kind: type) -> str:
         """The sentence for a name that is no setting."""
         names = " or ".join(field.name for field in dataclasses.fields(kind))
-        return f"{where.inner}: there is no setting '{name}', use {names}."
+        return f"{where.inner}: there is no setting '{name[:40]}', use {names}."
 
     def missing(self, where: Setting, name: str) -> str:
         """The sentence for a missing required setting."""
@@ -312,7 +312,7 @@ def _parse(path: Path) -> dict[str, Any]:
         values = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read ({error.strerror}).") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SettingsError(f"{path}: {error}.") from error
     if not isinstance(values, dict):
         raise SettingsError(f"{path}: must hold names and values.")
