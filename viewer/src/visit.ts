@@ -1,3 +1,4 @@
+import { admit, byKey } from './admission.ts';
 import type { Body } from './body/body.ts';
 import type { SkinnedBody } from './body/skinned/body.ts';
 import { BundleFiles, filesToFirstSight, loadManifest, THUMBNAIL } from './bundle/load.ts';
@@ -23,7 +24,7 @@ import { PlayerBar } from './ui/player.ts';
 import { offerDrawing } from './ui/sheets/drawing.ts';
 import { makeThemeButton, showTheme } from './ui/theme.ts';
 import type { PageWords } from './words/page-words.ts';
-import { say, type Sentence } from './words/text.ts';
+import { codeOf, say, type Sentence } from './words/text.ts';
 import { offerXr } from './xr/offer.ts';
 import type { Path } from './soft/contract.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
@@ -36,6 +37,9 @@ export interface Presence extends Cast {
   stage: Stage;
   conversation?: Conversation; // none of a body alone
 }
+
+/** What is wrong where a key helps. */
+const LOCKED = new Set<string>(['error.refused', 'error.key']);
 
 type Theatre = typeof import('./theatre.ts');
 
@@ -61,6 +65,10 @@ export interface VisitPorts {
   failed?(sentence: Sentence): void;
   /** Loads everything anew, where nothing else helps. */
   reload(): void;
+  /** The server's key, if the visitor has one. */
+  key?: string | null;
+  /** Tries a key that the visitor types; only where he may have one. */
+  unlock?(key: string): void;
 }
 
 /**
@@ -99,7 +107,7 @@ export class Visit {
     const { signal } = this.ending;
     const coming = import('./theatre.ts'); // meanwhile the first files are asked for
     coming.catch(() => {}); // heard of below
-    const told = loadManifest(server.file.bind(server), signal);
+    const told = this.loadManifest();
     const wish = wishOf(this.ports.draw);
     const drawing = drawingOf(wish);
     drawing.catch(() => {}); // heard of below
@@ -138,6 +146,13 @@ export class Visit {
     this.overlay.hide();
     if (conversation) page.talk(conversation);
     else focusOn(byId(root, 'play'));
+  }
+
+  private async loadManifest(): Promise<Manifest> {
+    const { server, ports } = this;
+    const { signal } = this.ending;
+    if (ports.key) await admit(server, byKey(server, ports.key), say('error.key'), signal);
+    return loadManifest(server.file.bind(server), signal);
   }
 
   /** Something else is to draw from now on; the talk goes on. */
@@ -234,8 +249,11 @@ export class Visit {
   private fail(error: unknown): void {
     if (this.ending.signal.aborted) return;
     if (!(error instanceof PageError)) console.error(error);
-    this.overlay.fail(sentenceOf(error));
-    this.ports.failed?.(sentenceOf(error));
+    const sentence = sentenceOf(error);
+    const { unlock } = this.ports;
+    if (unlock && LOCKED.has(codeOf(sentence))) this.overlay.askKey(sentence, unlock);
+    else this.overlay.fail(sentence);
+    this.ports.failed?.(sentence);
   }
 }
 

@@ -51,4 +51,16 @@ STILL_LIPS = Sentence(
 )
 VOICELESS = Sentence("voiceless", "The avatar has lost its voice; its captions go on.")
 
-SENTENCES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, VOICELESS)
+LONG = Sentence(
+    "long", "This conversation has lasted {minutes} min, as long as this server allows."
+)
+HASTY = Sentence(
+    "hasty", "so many questions are not answered in so short a time: wait a little, then ask again."
+)
+CROWDED = Sentence(
+    "crowded",
+    "too many conversations were begun from this address: try again in a minute.",
+)
+
+LIMITS = (LONG, HASTY, CROWDED)
+SENTENCES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, VOICELESS, *LIMITS)
