@@ -37,6 +37,10 @@ class Serve:
             page, with a certificate that this machine makes, keeps and renews.
         tls_cert: PEM file of a certificate to serve by HTTPS with, and of its chain.
         tls_key: PEM file of its private key.
+        metrics_port: Port on which Prometheus gets figures, without words of visitors; 0 takes any
+            free port, by default nobody gets them.
+        metrics_host: Address on which it gets them.
+        json_log: Write warnings and errors as lines of JSON.
         name: Host names, besides this machine's addresses, under which visitors come, such as those
             of a proxy, a tunnel or `machine.local`.
     """
@@ -53,6 +57,9 @@ class Serve:
     tls: bool = False
     tls_cert: Path | None = None
     tls_key: Path | None = None
+    metrics_port: int | None = None
+    metrics_host: str = "127.0.0.1"
+    json_log: bool = False
     name: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
 
     def run(self) -> None:
@@ -62,7 +69,7 @@ class Serve:
             Ico3dError: If the bundle, the settings or the port cannot be used, or a service cannot
                 be started.
         """
-        set_up_log(self.verbose)
+        set_up_log(self.verbose, self.json_log)
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.persona import read_persona
         from ico3d.chat.observing.monitor import Monitor, TurnLog
@@ -80,6 +87,8 @@ class Serve:
         monitor = Monitor(TurnLog.open(self.log) if self.log else None)
         reach = find_reach(self.host, self.name, self.tls, self.tls_cert, self.tls_key)
         listener = server.bind(self.host, self.port)
+        port = self.metrics_port
+        figures = None if port is None else monitor.publish(self.metrics_host, port)
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
@@ -89,6 +98,8 @@ class Serve:
         listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
         print("\n".join(reach.told(listener.getsockname()[1], sites.asks_for_tokens)))
+        if figures:
+            print(f"Prometheus finds figures at {figures}")
         if avatar and parts:
             warm_up(parts)
             offered = offers(settings, avatar.persona.voice)
@@ -98,7 +109,7 @@ class Serve:
         sys.stdout.flush()
         if self.open:
             webbrowser.open(url)
-        server.make_server(app, reach.certificate).run(sockets=[listener])
+        server.make_server(app, reach.certificate, sessions).run(sockets=[listener])
 
 
 @dataclass(frozen=True)

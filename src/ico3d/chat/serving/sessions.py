@@ -13,7 +13,7 @@ from ico3d.chat.services.offers import wished
 from ico3d.chat.serving.freeing import give_back
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
 from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
-from ico3d.chat.wire.sentences import FAULT, IDLE
+from ico3d.chat.wire.sentences import ENDING, FAULT, IDLE
 from ico3d.errors import ServiceError
 
 STARTING = 30.0  # s that a conversation may take to start: a model may be loaded, a server asked
@@ -65,6 +65,7 @@ class Sessions:
         self._closing: set[asyncio.Task] = set()
         self.line = WaitingLine(self._free, kept=resume_seconds)
         """Visitors for whom there is no place yet."""
+        self.monitor.waiting.set_function(lambda: len(self.line))
         self._stays = Stays()
 
     def __len__(self) -> int:
@@ -83,6 +84,7 @@ class Sessions:
 
         Raises:
             FullError: If the queue is full; sessions whose page is away count as taken places.
+            ClosedError: If the server is about to end.
         """
         if self._resumable(hello):
             return None
@@ -134,9 +136,18 @@ class Sessions:
         loop = asyncio.get_running_loop()
         session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session, "left")
 
+    def present(self) -> list[Session]:
+        """All sessions, those included whose page may come back."""
+        return list(self._open.values())
+
+    def dismiss(self, session: Session) -> None:
+        """Ends a session because the server ends, and tells its page."""
+        session.page.end(ENDING.error(fatal=True, again=True))
+        self._close_soon(session, "server")
+
     async def close_all(self) -> None:
         """Ends all sessions."""
-        for session in list(self._open.values()):
+        for session in self.present():
             self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
 

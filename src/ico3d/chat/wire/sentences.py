@@ -49,6 +49,7 @@ STILL_LIPS = Sentence(
     "still-lips",
     "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks.",
 )
+ENDING = Sentence("ending", "This server is about to restart: try again in a moment.")
 VOICELESS = Sentence("voiceless", "The avatar has lost its voice; its captions go on.")
 
-SENTENCES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, VOICELESS)
+SENTENCES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, ENDING, VOICELESS)

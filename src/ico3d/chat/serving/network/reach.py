@@ -120,7 +120,7 @@ def find_reach(
     """
     now = now or datetime.now(UTC)
     names = tuple(dict.fromkeys(map(checked_name, names)))
-    machine = () if host in LOOPBACK else machine_names(socket.gethostname())
+    machine = own_names(host)
     if (cert is None) != (key is None):
         raise SettingsError("--tls-cert and --tls-key belong together: give both or neither.")
     if cert is not None and key is not None:
@@ -134,6 +134,11 @@ def find_reach(
     if host not in LOOPBACK:
         hosts |= {*machine_addresses(host)}
     return Reach(host, names, machine, own_certificate(folder or state_folder(), hosts, now))
+
+
+def own_names(host: str) -> tuple[str, ...]:
+    """This machine's names, under which a server bound to `host` answers; none on loopback."""
+    return () if host in LOOPBACK else machine_names(socket.gethostname())
 
 
 def machine_names(name: str) -> tuple[str, ...]:
