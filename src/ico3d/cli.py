@@ -64,6 +64,7 @@ VERBS: dict[str, Verb] = {
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
     "token": Verb("ico3d.chat.commands", "Token", "make a token for pages that embed an avatar"),
+    "doctor": Verb("ico3d.chat.doctor.command", "Doctor", "check a machine or a deployment"),
     "weights list": Verb(
         "ico3d.common.downloads.commands", "ListWeights", "weights that can be used"
     ),

@@ -37,6 +37,10 @@ class Serve:
             page, with a certificate that this machine makes, keeps and renews.
         tls_cert: PEM file of a certificate to serve by HTTPS with, and of its chain.
         tls_key: PEM file of its private key.
+        metrics_port: Port on which Prometheus gets figures, without words of visitors; 0 takes any
+            free port, by default nobody gets them.
+        metrics_host: Address on which it gets them.
+        json_log: Write warnings and errors as lines of JSON.
         name: Host names, besides this machine's addresses, under which visitors come, such as those
             of a proxy, a tunnel or `machine.local`.
         proxy: Addresses or networks of proxies that encrypt and tell where visitors come from
@@ -57,6 +61,9 @@ class Serve:
     tls: bool = False
     tls_cert: Path | None = None
     tls_key: Path | None = None
+    metrics_port: int | None = None
+    metrics_host: str = "127.0.0.1"
+    json_log: bool = False
     name: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     proxy: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     open: bool = False
@@ -68,7 +75,7 @@ class Serve:
             Ico3dError: If the bundle, the settings or the port cannot be used, or a service cannot
                 be started.
         """
-        set_up_log(self.verbose)
+        set_up_log(self.verbose, self.json_log)
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.persona import read_persona
         from ico3d.chat.observing.monitor import Monitor, TurnLog
@@ -89,6 +96,8 @@ class Serve:
         key = shown_key(reach.is_public, self.open, embedding)
         sites = open_sites(embedding, key or "")
         listener = server.bind(self.host, self.port)
+        port = self.metrics_port
+        figures = None if port is None else monitor.publish(self.metrics_host, port)
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
@@ -101,6 +110,8 @@ class Serve:
         name = (persona or bundle.manifest.persona).name
         print(f"{name} is at {url}{fragment(key)} (Ctrl+C ends)")
         print("\n".join(reach.told(listener.getsockname()[1], key)))
+        if figures:
+            print(f"Prometheus finds figures at {figures}")
         if avatar and parts:
             offered = offers(settings, avatar.persona.voice)
             print("\n".join(described(parts.services, offered)))
@@ -110,7 +121,7 @@ class Serve:
         if self.browser:
             admission = f"?token={sites.token('')[0]}" if sites.asks_for_tokens else ""
             webbrowser.open(url + admission)
-        server.make_server(app, reach.certificate, reach.proxies).run(sockets=[listener])
+        server.make_server(app, reach.certificate, reach.proxies, sessions).run(sockets=[listener])
 
 
 @dataclass(frozen=True)

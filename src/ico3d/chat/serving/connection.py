@@ -12,13 +12,14 @@ from ico3d.chat.page import Outbox
 from ico3d.chat.serving.crowd import machine_of
 from ico3d.chat.serving.limits import ConnectionLimits, Inlet
 from ico3d.chat.serving.sessions import HastyError, Session, Sessions
-from ico3d.chat.serving.waiting import FullError, Ticket
+from ico3d.chat.serving.waiting import ClosedError, FullError, Ticket
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
 from ico3d.chat.wire.protocol import Ack, Error, Hello, Notice, Welcome
 from ico3d.chat.wire.sentences import (
     CROWDED,
     ELSEWHERE,
+    ENDING,
     FAULT,
     FULL,
     OUTDATED,
@@ -113,6 +114,8 @@ class Connection:
         except HastyError as error:
             self._sessions.monitor.failed("hasty")
             raise Hangup(BUSY, CROWDED, again=True) from error
+        except ClosedError as error:
+            raise Hangup(BUSY, ENDING, again=True) from error
         if ticket is None:
             return None
         try:
@@ -137,6 +140,8 @@ class Connection:
                 moved.cancel()
                 if ticket.replaced:
                     raise Hangup(GOING, ELSEWHERE, again=True)
+                if ticket.turned_away:
+                    raise Hangup(BUSY, ENDING, again=True)
                 if spoken.done():
                     spoken.result()
                     raise Hangup(BROKEN, "a page that waits for its turn sends nothing.")

@@ -15,7 +15,7 @@ from ico3d.chat.serving.freeing import give_back
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
 from ico3d.chat.supervision.allowance import Allowance, Bucket
 from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
-from ico3d.chat.wire.sentences import FAULT, IDLE, LONG
+from ico3d.chat.wire.sentences import ENDING, FAULT, IDLE, LONG
 from ico3d.errors import ServiceError
 
 STARTS, STARTS_AT_ONCE = 0.1, 5  # a second for long and at once, per place that a machine may have
@@ -88,6 +88,7 @@ class Sessions:
         self._closing: set[asyncio.Task] = set()
         self.line = WaitingLine(self._free, kept=resume_seconds, has_share=self._has_share)
         """Visitors for whom there is no place yet."""
+        self.monitor.waiting.set_function(lambda: len(self.line))
         self._stays = Stays()
         limits = avatar.settings.limits
         self._share = share = limits.share(avatar.settings.max_sessions)
@@ -112,6 +113,7 @@ class Sessions:
         Raises:
             FullError: If the queue is full; sessions whose page is away count as taken places.
             HastyError: If the machine has begun too many conversations in a short time.
+            ClosedError: If the server is about to end.
         """
         if self._resumable(hello):
             return None
@@ -165,9 +167,18 @@ class Sessions:
         loop = asyncio.get_running_loop()
         session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session, "left")
 
+    def present(self) -> list[Session]:
+        """All sessions, those included whose page may come back."""
+        return list(self._open.values())
+
+    def dismiss(self, session: Session) -> None:
+        """Ends a session because the server ends, and tells its page."""
+        session.page.end(ENDING.error(fatal=True, again=True))
+        self._close_soon(session, "server")
+
     async def close_all(self) -> None:
         """Ends all sessions."""
-        for session in list(self._open.values()):
+        for session in self.present():
             self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
 

@@ -16,6 +16,10 @@ class FullError(Exception):
     """The queue is full as well; the sentence is for the page."""
 
 
+class ClosedError(Exception):
+    """The server is about to end, and takes nobody any more."""
+
+
 class Ticket:
     """The claim of one connection to a place in the queue.
 
@@ -23,6 +27,7 @@ class Ticket:
         id: Id by which a page comes back to its place; its session gets the same one.
         admitted: Whether a place is free for this visitor, and kept until the session begins.
         replaced: Whether another connection has claimed the same place.
+        turned_away: Whether there will be no place, because the server is about to end.
         changed: Set when the queue has moved.
         machine: Machine of the visitor; empty if unknown.
     """
@@ -30,7 +35,7 @@ class Ticket:
     def __init__(self, id: str, machine: str = ""):
         """Waits with its page present."""
         self.id, self.machine = id, machine
-        self.admitted = self.replaced = False
+        self.admitted = self.replaced = self.turned_away = False
         self.changed = asyncio.Event()
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
 
@@ -62,6 +67,7 @@ class WaitingLine:
         self._has_share = has_share
         self._waiting: dict[str, Ticket] = {}  # in order
         self._admitted: set[Ticket] = set()
+        self.is_closed = False
 
     def __len__(self) -> int:
         """How many are waiting, including those whose connection was lost a moment ago."""
@@ -76,7 +82,10 @@ class WaitingLine:
 
         Raises:
             FullError: If the queue has as many visitors as it may have, at all or of this machine.
+            ClosedError: If the server is about to end.
         """
+        if self.is_closed:
+            raise ClosedError
         before = self._waiting.get(id or "")
         if before is None and self._is_full(machine) and not self._admits(machine):
             raise FullError
@@ -122,6 +131,13 @@ class WaitingLine:
         for ticket in self._waiting.values():
             ticket.changed.set()
 
+    def close(self) -> None:
+        """Admits nobody any more, and tells those who wait."""
+        self.is_closed = True
+        for ticket in self._waiting.values():
+            ticket.turned_away = True
+            ticket.changed.set()
+
     def position(self, ticket: Ticket) -> int:
         """Position of a waiting ticket; 1 is the front."""
         return list(self._waiting).index(ticket.id) + 1
@@ -136,7 +152,7 @@ class WaitingLine:
         return len(self._waiting) >= self._most or len(same) >= SHARE * self._most
 
     def _spare(self) -> int:
-        return max(0, self._free() - len(self._admitted))
+        return 0 if self.is_closed else max(0, self._free() - len(self._admitted))
 
     @staticmethod
     def _cancel_expiry(ticket: Ticket) -> None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from ico3d.chat.wire.protocol import Error, Notice
 
-
 @dataclass(frozen=True)
 class Sentence:
     """A sentence for visitors.
@@ -29,7 +28,6 @@ class Sentence:
         """The sentence as a notice of `welcome`."""
         return Notice(self.code, self.text)
 
-
 IDLE = Sentence("idle", "Nothing was said for {minutes} min, so this conversation has ended.")
 FAULT = Sentence("fault", "The conversation broke off because of a fault in the server.")
 FULL = Sentence(
@@ -49,8 +47,8 @@ STILL_LIPS = Sentence(
     "still-lips",
     "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks.",
 )
+ENDING = Sentence("ending", "This server is about to restart: try again in a moment.")
 VOICELESS = Sentence("voiceless", "The avatar has lost its voice; its captions go on.")
-
 LONG = Sentence(
     "long", "This conversation has lasted {minutes} min, as long as this server allows."
 )
@@ -62,5 +60,7 @@ CROWDED = Sentence(
     "too many conversations were begun from this address: try again in a minute.",
 )
 
+
 LIMITS = (LONG, HASTY, CROWDED)
-SENTENCES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, VOICELESS, *LIMITS)
+STATES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, ENDING, VOICELESS)
+SENTENCES = (*STATES, *LIMITS)

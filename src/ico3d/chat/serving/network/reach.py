@@ -153,7 +153,7 @@ def find_reach(
             f"--host {host}: visitors have to show a key, which must not travel unencrypted. Add "
             "--tls, or --proxy ADDRESS if a proxy there encrypts, or --open to admit everybody."
         )
-    machine = () if host in LOOPBACK else machine_names(socket.gethostname())
+    machine = own_names(host)
     if (cert is None) != (key is None):
         raise SettingsError("--tls-cert and --tls-key belong together: give both or neither.")
     if cert is not None and key is not None:
@@ -168,6 +168,11 @@ def find_reach(
         hosts |= {*machine_addresses(host)}
     certificate = own_certificate(folder or state_folder(), hosts, now)
     return Reach(host, names, machine, certificate, proxies)
+
+
+def own_names(host: str) -> tuple[str, ...]:
+    """This machine's names, under which a server bound to `host` answers; none on loopback."""
+    return () if host in LOOPBACK else machine_names(socket.gethostname())
 
 
 def machine_names(name: str) -> tuple[str, ...]:
