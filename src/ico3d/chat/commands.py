@@ -39,6 +39,8 @@ class Serve:
         tls_key: PEM file of its private key.
         name: Host names, besides this machine's addresses, under which visitors come, such as those
             of a proxy, a tunnel or `machine.local`.
+        without_consent: Serve the avatar although its bundle does not say that the person it shows
+            agreed.
     """
 
     bundle: Annotated[Path, tyro.conf.Positional]
@@ -54,16 +56,18 @@ class Serve:
     tls_cert: Path | None = None
     tls_key: Path | None = None
     name: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    without_consent: bool = False
 
     def run(self) -> None:
         """Serves until interrupted.
 
         Raises:
-            Ico3dError: If the bundle, the settings or the port cannot be used, or a service cannot
-                be started.
+            Ico3dError: If the bundle, the settings or the port cannot be used, the bundle states no
+                consent, or a service cannot be started.
         """
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
+        from ico3d.bundle.people.provenance import check_consent
         from ico3d.bundle.persona import read_persona
         from ico3d.chat.observing.monitor import Monitor, TurnLog
         from ico3d.chat.parts import make_parts, warm_up
@@ -81,6 +85,8 @@ class Serve:
         reach = find_reach(self.host, self.name, self.tls, self.tls_cert, self.tls_key)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
+        if not self.without_consent:
+            check_consent(bundle.manifest.provenance, self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
         parts = make_parts(avatar) if avatar else None  # loads what they need, too

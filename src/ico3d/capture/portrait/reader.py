@@ -151,9 +151,9 @@ class TalkingPortrait(RecordedCapture):
 
     @property
     def provenance(self) -> dict:
-        """Consent, licence and sources, as far as the folder states them."""
-        unknown = {"sources": [self.path.name], "consent": "not stated", "licence": "not stated"}
-        return {"kind": self.kind, **unknown, **self._details.get("provenance", {})}
+        """Likeness, consent, licence and sources, as far as the folder states them."""
+        unknown = super().provenance | {"sources": [self.path.name]}
+        return unknown | self._details.get("provenance", {})
 
     @property
     def details(self) -> dict:
