@@ -14,6 +14,7 @@ from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleve
 from ico3d.capture.decoding import DAMAGED, unit
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
+from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
 
@@ -60,6 +61,7 @@ class SyntheticCapture(RecordedCapture):
         return {
             "kind": self.kind,
             "sources": list(self._about["sources"]),
+            "likeness": NOBODY,
             "consent": "not needed: no such person exists",
             "licence": str(self._about.get("licence", "")),
         }

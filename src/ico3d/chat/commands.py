@@ -47,6 +47,8 @@ class Serve:
             (X-Forwarded-For); nobody else is believed.
         open: Admit everybody who reaches the server; else visitors from other machines have to
             show a key: that of the settings, or one that is made anew at each start and printed.
+        without_consent: Serve the avatar although its bundle does not say that the person it shows
+            agreed.
     """
 
     bundle: Annotated[Path, tyro.conf.Positional]
@@ -67,16 +69,18 @@ class Serve:
     name: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     proxy: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     open: bool = False
+    without_consent: bool = False
 
     def run(self) -> None:
         """Serves until interrupted.
 
         Raises:
-            Ico3dError: If the bundle, the settings or the port cannot be used, or a service cannot
-                be started.
+            Ico3dError: If the bundle, the settings or the port cannot be used, the bundle states no
+                consent, or a service cannot be started.
         """
         set_up_log(self.verbose, self.json_log)
         from ico3d.bundle.format import Bundle
+        from ico3d.bundle.people.provenance import check_consent
         from ico3d.bundle.persona import read_persona
         from ico3d.chat.observing.monitor import Monitor, TurnLog
         from ico3d.chat.parts import make_parts, warm_up
@@ -99,6 +103,8 @@ class Serve:
         port = self.metrics_port
         figures = None if port is None else monitor.publish(self.metrics_host, port)
         bundle = Bundle.open(self.bundle)
+        if not self.without_consent:
+            check_consent(bundle.manifest.provenance, self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
         parts = make_parts(avatar) if avatar else None  # loads what they need, too

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ico3d.chat.wire.protocol import Error, Notice
 
+
 @dataclass(frozen=True)
 class Sentence:
     """A sentence for visitors.
@@ -27,6 +28,7 @@ class Sentence:
     def notice(self) -> Notice:
         """The sentence as a notice of `welcome`."""
         return Notice(self.code, self.text)
+
 
 IDLE = Sentence("idle", "Nothing was said for {minutes} min, so this conversation has ended.")
 FAULT = Sentence("fault", "The conversation broke off because of a fault in the server.")
