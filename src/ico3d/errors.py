@@ -4,9 +4,22 @@
 class Ico3dError(Exception):
     """Base of every error the command line prints as one sentence, without a traceback."""
 
+    def __str__(self) -> str:
+        """The sentence, on one line and without characters that a terminal would obey.
+
+        Sentences quote names and values from files that anybody may have made.
+        """
+        text = super().__str__()
+        return text if text.isprintable() else "".join(map(_shown, text))
+
     def __reduce__(self):
         """Travels between processes as its sentence, whatever its constructor takes."""
         return _again, (type(self), self.args), self.__dict__
+
+
+def _shown(character: str) -> str:
+    """A character as it is, or as its escape where it is no printable one."""
+    return character if character.isprintable() else ascii(character)[1:-1]
 
 
 def _again(kind: type[Ico3dError], words: tuple) -> Ico3dError:

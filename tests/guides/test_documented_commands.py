@@ -18,7 +18,7 @@ from ico3d import cli
 
 GROUPED = re.compile(r"--[a-z0-9-]+\.[a-z0-9-]+")
 """An option with the name of its group."""
-SCRIPTS = sorted((ROOT / "bench").glob("*.py"))
+SCRIPTS = sorted([*(ROOT / "bench").glob("*.py"), *(ROOT / "bench").glob("*/__main__.py")])
 PACKAGE = json.loads((ROOT / "viewer" / "package.json").read_text("utf-8"))
 TARGETS = re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
 
@@ -46,7 +46,7 @@ def test_what_a_page_names_is_taken(page, capsys):
         )
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.relative_to(ROOT).as_posix())
 def test_what_a_script_says_of_itself_is_taken(script, capsys):
     for words in of_script(script):
         assert taken(words), f"{shlex.join(words)}: {capsys.readouterr().err}"
@@ -149,7 +149,8 @@ def settings_of(script: Path) -> type:
 
 def load(script: Path) -> ModuleType:
     """A script as a module that runs nothing."""
-    name = f"bench.{script.stem}"
+    script = script / "__main__.py" if script.is_dir() else script
+    name = "bench." + ".".join(script.relative_to(ROOT / "bench").with_suffix("").parts)
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, script)
         assert spec is not None and spec.loader is not None

@@ -14,7 +14,7 @@ from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
-from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
 
 ABOUT = "avatar.json"
 """Name of the file that marks a folder as an avatar's."""
@@ -179,7 +179,7 @@ class TrainedAvatar:
         folder = Path(folder)
         try:
             summary = json.loads((folder / ABOUT).read_text())["summary"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no avatar ({error}): make one with ico3d assemble."
             ) from error

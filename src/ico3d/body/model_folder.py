@@ -14,7 +14,7 @@ from ico3d.body.settings import Method
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.splat.gaussians import Gaussians
-from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
 
 ABOUT = "body.json"
 """Name of the file that marks a folder as a body's."""
@@ -48,8 +48,11 @@ def load_window(file: Path) -> WindowModel:
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
             parts[part][rest] = tensor
-        return WindowModel(motion_from(about), parts["gaussians"], parts["shared"], colors)
-    except (KeyError, TypeError, ValueError) as error:
+        motion, shared = motion_from(about), parts["shared"]
+        one = {name: tensor[:1] for name, tensor in parts["gaussians"].items()}
+        WindowModel(motion, one, shared).at(0.0)  # better refused here than where it is drawn
+        return WindowModel(motion, parts["gaussians"], shared, colors)
+    except DAMAGED as error:
         raise ModelError(f"{file} does not hold a window of a body: {error}.") from error
 
 
@@ -146,7 +149,7 @@ class TrainedBody:
             files = [folder / str(entry["file"]) for entry in entries]
             fps, method = float(content["fps"]), content["method"]
             summary = content["summary"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no body ({error}): train one with ico3d train body."
             ) from error

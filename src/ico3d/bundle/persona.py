@@ -131,7 +131,7 @@ def _check_note(note: str, number: int, path: Path) -> None:
 def _parse_toml(data: bytes, path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(data.decode())
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise BundleError(f"{path}: is not valid TOML ({error}).") from error
 
 

@@ -5,15 +5,16 @@ import wave
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 from safetensors import SafetensorError
 from safetensors.numpy import load
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
-from ico3d.capture.decoding import unit
+from ico3d.capture.decoding import DAMAGED, unit
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
+from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
 
@@ -60,6 +61,7 @@ class SyntheticCapture(RecordedCapture):
         return {
             "kind": self.kind,
             "sources": list(self._about["sources"]),
+            "likeness": NOBODY,
             "consent": "not needed: no such person exists",
             "licence": str(self._about.get("licence", "")),
         }
@@ -100,9 +102,10 @@ class SyntheticCapture(RecordedCapture):
                     raise CaptureError(f"the sound {file} is not mono with 16 bits.")
                 check_claim(file, open_claim(sound, file.stat().st_size))
                 rate, data = sound.getframerate(), sound.readframes(sound.getnframes())
-        except (OSError, *WAV_ERRORS) as error:
+            pcm = np.frombuffer(data, "<i2")  # ValueError for half a sample
+        except (OSError, ValueError, *WAV_ERRORS) as error:
             raise CaptureError(f"the sound {file} is missing or damaged: record again.") from error
-        return Sound(np.frombuffer(data, "<i2").astype(np.float32) / 32767, rate)
+        return Sound(pcm.astype(np.float32) / 32767, rate)
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
         """(4, 4) float64 exact head pose."""
@@ -186,7 +189,7 @@ def _check_array(
 def _read_json(file: Path) -> dict:
     try:
         about = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise CaptureError(f"{file} is missing or damaged: record again.") from error
     if not isinstance(about, dict) or about.get("format") != FORMAT:
         raise CaptureError(f"{file} does not describe a synthetic capture ('{FORMAT}').")
@@ -217,7 +220,7 @@ def _read_png(file: Path, camera: Camera, mode: str, what: str) -> np.ndarray:
     try:
         with Image.open(file) as image:
             pixels = np.asarray(image if image.mode == mode else image.convert(mode))
-    except (OSError, UnidentifiedImageError, ValueError) as error:
+    except DAMAGED as error:
         raise CaptureError(f"{file} ({what}) is missing or damaged: record again.") from error
     if pixels.shape[:2] != (camera.height, camera.width):
         raise CaptureError(

@@ -66,7 +66,7 @@ class Video:
         """Every picture of the file with its seconds after the first one."""
         import av
 
-        with av.open(str(self.path)) as container:
+        with av.open(str(self.path), metadata_errors="replace") as container:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
             first = None
@@ -104,10 +104,12 @@ def open_video(path: Path, size: int) -> Video:
     if not path.is_file():
         raise CaptureError(f"there is no video file at {path}.")
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(path), metadata_errors="replace") as container:
             if not container.streams.video:
                 raise CaptureError(f"{path} holds no video stream.")
             stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise CaptureError(f"{path}: its video is of a kind that cannot be decoded here.")
             width, height = stream.codec_context.width, stream.codec_context.height
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1
@@ -133,8 +135,8 @@ def read_sound(path: Path) -> Sound | None:
     import av
     import soxr
 
-    with av.open(str(path)) as container:
-        if not container.streams.audio:
+    with av.open(str(path), metadata_errors="replace") as container:
+        if not container.streams.audio or container.streams.audio[0].codec_context is None:
             return None
         stream, offset = container.streams.audio[0], _sound_offset(container)
         check_claim(path, Claim(stream.rate, frames=int(abs(offset) * stream.rate)))

@@ -15,7 +15,7 @@ from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
-from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
 
 Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
@@ -276,7 +276,7 @@ class HeadModel(nn.Module):
             fields["box_center"] = tuple(fields["box_center"])
             model = cls(HeadShape(**fields), tensors["means"].shape[0])
             model.load_state_dict(tensors)
-        except (KeyError, TypeError, RuntimeError) as error:
+        except DAMAGED as error:
             raise ModelError(
                 f"{path} does not hold a head model: {json.dumps(str(error))}."
             ) from error

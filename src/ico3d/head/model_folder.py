@@ -23,7 +23,7 @@ from ico3d.head.model import HeadModel
 from ico3d.head.views import poses_digest
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
-from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
 
 ABOUT = "head.json"
 """Name of the file that marks a folder as one of a head."""
@@ -156,7 +156,7 @@ class TrainedHead:
             encoder = about["encoder"], about["encoder_sha256"]
             summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))
             eyes, turn = _eyes(about.get("eyes")), _turn(about.get("turn"))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no trained head ({error}): train one with ico3d train head."
             ) from error
@@ -216,6 +216,6 @@ def _load_adaptor(path: Path) -> SpeechAdaptor:
     try:
         adaptor = SpeechAdaptor(int(state["features"]), int(state.get("vectors", 1)))
         adaptor.restore(tensors)
-    except (KeyError, RuntimeError) as error:
+    except DAMAGED as error:
         raise ModelError(f"{path} does not hold a speech adaptor ({error}).") from error
     return adaptor

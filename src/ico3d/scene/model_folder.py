@@ -10,7 +10,7 @@ from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.scene.model import StaticScene
 from ico3d.scene.views import Frames, Only, Space
-from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
 
 ABOUT = "scene.json"
 """Name of the file that marks a folder as one of a scene."""
@@ -61,7 +61,7 @@ class TrainedScene:
         try:
             about = json.loads((folder / ABOUT).read_text())
             fields = {name: about[name] for name in ("only", "frames", "space", "summary")}
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no scene ({error}): train one with ico3d train static."
             ) from error

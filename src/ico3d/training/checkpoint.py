@@ -25,6 +25,16 @@ DTYPES = {
     torch.bool: "BOOL",
 }
 """The names that the safetensors format has for types of numbers."""
+DAMAGED = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    RuntimeError,
+)
+"""What reading values out of a model's JSON and tensors raises where they are damaged."""
 ALIGNMENT = 8
 """The header of a safetensors file ends at a multiple of this many bytes."""
 
@@ -104,7 +114,7 @@ def _opened(path: Path) -> Iterator[safe_open]:
     try:
         with safe_open(path, framework="pt") as file:
             yield file
-    except (SafetensorError, KeyError, ValueError, OSError) as error:
+    except (SafetensorError, *DAMAGED) as error:
         raise ModelError(
             f"{path} is damaged or no file of ico3d ({error}): train again."
         ) from error

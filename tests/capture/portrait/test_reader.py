@@ -184,7 +184,7 @@ def test_pickled_arrays_are_refused(folder):
 
 def test_damaged_json(folder):
     (folder / "transforms_train.json").write_text('{"frames": [')
-    _fails(folder, "transforms_train.json", "cannot be read")
+    _fails(folder, "transforms_train.json", "no JSON")
 
 
 def test_scaled_pictures_do_not_fit_the_lens(folder):

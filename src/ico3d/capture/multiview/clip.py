@@ -188,14 +188,14 @@ def _opened(path: Path) -> Any:
     except ImportError:
         raise MissingExtraError("av", "train", "reading videos") from None
     try:
-        container = av.open(str(path))
+        container = av.open(str(path), metadata_errors="replace")
     except FileNotFoundError as error:
         raise CaptureError(f"{path} is missing.") from error
     except (FFmpegError, OSError, ValueError) as error:
         raise CaptureError(f"{path} cannot be read as a video; is it damaged?") from error
-    if not container.streams.video:
+    if not any(stream.codec_context for stream in container.streams.video[:1]):
         container.close()
-        raise CaptureError(f"{path} holds no video stream.")
+        raise CaptureError(f"{path} holds no video stream that can be decoded here.")
     return container
 
 

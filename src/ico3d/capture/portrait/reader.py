@@ -1,6 +1,5 @@
 """Reads the talking-portrait layout, written by ico3d or by other programs."""
 
-import json
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
@@ -11,8 +10,9 @@ from PIL import Image
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import EYE_NAMES, RecordedCapture, Sound, Split
-from ico3d.capture.decoding import to_bytes, unit
+from ico3d.capture.decoding import DAMAGED, to_bytes, unit
 from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
+from ico3d.capture.multiview.description import MOST_FRAMES, number, read_json
 from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
 from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
 from ico3d.capture.sound import read_sound_file
@@ -42,8 +42,8 @@ class TalkingPortrait(RecordedCapture):
             CaptureError: If a file is missing or damaged; the sentence names file and frame.
         """
         self.path = path
-        self._details = _read_json(path / DETAILS) if (path / DETAILS).is_file() else {}
-        parts = {name: _read_json(path / f"transforms_{name}.json") for name in ("train", "val")}
+        self._details = read_json(path / DETAILS) if (path / DETAILS).is_file() else {}
+        parts = {name: read_json(path / f"transforms_{name}.json") for name in ("train", "val")}
         ids = {name: _ids(path, name, part) for name, part in parts.items()}
         self.split = Split(ids["train"], ids["val"])
         self._poses = {
@@ -51,9 +51,11 @@ class TalkingPortrait(RecordedCapture):
             for name, part in parts.items()
             for frame in part["frames"]
         }
-        self.fps = float(self._details.get("fps", FPS))
         listed = max(self._poses) + 1
-        self.num_frames = int(self._details.get("num_frames", max(listed, self._count_pictures())))
+        counted = {"fps": FPS, "num_frames": max(listed, self._count_pictures())} | self._details
+        where = str(path / DETAILS)
+        self.fps = number(counted, "fps", where, 1e-3, 1e3)
+        self.num_frames = int(number(counted, "num_frames", where, listed, MOST_FRAMES))
         self.cameras = (self._camera(parts["train"]),)
         self.blendshape_names = self._names()
         _check_ids(path, sorted(self._poses))
@@ -151,9 +153,10 @@ class TalkingPortrait(RecordedCapture):
 
     @property
     def provenance(self) -> dict:
-        """Consent, licence and sources, as far as the folder states them."""
-        unknown = {"sources": [self.path.name], "consent": "not stated", "licence": "not stated"}
-        return {"kind": self.kind, **unknown, **self._details.get("provenance", {})}
+        """Likeness, consent, licence and sources, as far as the folder states them."""
+        unknown = super().provenance | {"sources": [self.path.name]}
+        stated = self._details.get("provenance")
+        return unknown | (stated if isinstance(stated, dict) else {})
 
     @property
     def details(self) -> dict:
@@ -174,7 +177,7 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "au.csv"
         if not path.is_file():
             return None
-        header = path.read_text().split("\n", 1)[0].split(",")
+        header = _reading(path, path.read_text).split("\n", 1)[0].split(",")
         names = [name.strip() for name in header]
         missing = [name for name in AU_COLUMNS if name not in names]
         if missing:
@@ -237,8 +240,7 @@ class TalkingPortrait(RecordedCapture):
         path = self._parsing_file(frame)
         if frame not in self._poses or not path.is_file():
             return None
-        with _reading(path, lambda: Image.open(path)) as picture:
-            return np.asarray(picture.convert("RGB"))
+        return _picture(path, "RGB")
 
     def _parsing_file(self, frame: int) -> Path:
         """Where the parsing picture of a frame lies, if it was parsed."""
@@ -312,8 +314,9 @@ def _ids(path: Path, name: str, transforms: dict) -> tuple[int, ...]:
     frames = transforms.get("frames")
     if not isinstance(frames, list) or (name == "train" and not frames):
         raise CaptureError(f"{file} lists no frames.")
-    ids = [frame.get("img_id") for frame in frames]
-    if not all(isinstance(i, int) and i >= 0 for i in ids):
+    given = [frame.get("img_id") if isinstance(frame, dict) else None for frame in frames]
+    ids = [i for i in given if isinstance(i, int) and i >= 0]
+    if len(ids) < len(given):
         raise CaptureError(f"{file}: every frame needs a whole img_id of 0 or more.")
     doubled = sorted({i for i in ids if ids.count(i) > 1}) if len(set(ids)) < len(ids) else []
     if doubled:
@@ -332,7 +335,7 @@ def _pose(path: Path, name: str, frame: dict) -> np.ndarray:
     where = f"{path / f'transforms_{name}.json'}: frame {frame['img_id']}"
     try:
         matrix = np.asarray(frame["transform_matrix"], np.float64)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise CaptureError(f"{where} has no 4x4 transform_matrix.") from error
     if matrix.shape != (4, 4):
         raise CaptureError(f"{where} has no 4x4 transform_matrix.")
@@ -346,32 +349,19 @@ def _pose(path: Path, name: str, frame: dict) -> np.ndarray:
     return pose
 
 
-def _read_json(path: Path) -> dict:
-    """One JSON object."""
-    if not path.is_file():
-        raise CaptureError(f"{path} is missing.")
-    content = _reading(path, lambda: json.loads(path.read_text()))
-    if not isinstance(content, dict):
-        raise CaptureError(f"{path} must hold a JSON object.")
-    return content
-
-
-def _picture(path: Path) -> np.ndarray:
-    """A picture as uint8 (H, W, 3), or (H, W) where it is grey."""
-    with _reading(path, lambda: Image.open(path)) as picture:
-        return _reading(path, lambda: np.asarray(_plain(picture)))
-
-
-def _plain(picture: Image.Image) -> Image.Image:
-    """A picture in grey or RGB."""
-    return picture if picture.mode in ("L", "RGB") else picture.convert("RGB")
+def _picture(path: Path, *modes: str) -> np.ndarray:
+    """A picture as uint8, in one of some modes of Pillow: as it is, or else in the first."""
+    wanted = modes or ("RGB", "L")
+    with _reading(path, lambda: Image.open(path)) as opened:
+        kept = opened.mode in wanted
+        return _reading(path, lambda: np.asarray(opened if kept else opened.convert(wanted[0])))
 
 
 def _reading(path: Path, read: Callable[[], Result]) -> Result:
     """Reads a file; what goes wrong becomes one sentence."""
     try:
         return read()
-    except (OSError, ValueError, RuntimeError) as error:
+    except (*DAMAGED, RuntimeError) as error:
         raise CaptureError(f"{path} cannot be read: {error}.") from error
 
 

@@ -37,6 +37,7 @@ from ico3d.capture.surface.first_points import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
 from ico3d.common.camera import Camera
 from ico3d.common.device import DeviceName
+from ico3d.common.people.stated import NOT_STATED
 from ico3d.common.spread import spread
 from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
@@ -57,7 +58,8 @@ class PortraitSettings:
         size: Upper limit of the pictures' short side in pixels; larger videos are scaled down.
         focal: Focal length in pixels of the original video; None to estimate it.
         refine: Whether to correct the poses by pictures of the whole head.
-        consent: What the person agreed to.
+        likeness: Whose likeness it is: the person's name.
+        consent: What the person agreed to, and how.
         licence: Licence of the recording.
         device: Where to correct the poses.
     """
@@ -65,8 +67,9 @@ class PortraitSettings:
     size: int = 512
     focal: float | None = None
     refine: bool = True
-    consent: str = "not stated"
-    licence: str = "not stated"
+    likeness: str = NOT_STATED
+    consent: str = NOT_STATED
+    licence: str = NOT_STATED
     device: DeviceName = "auto"
 
 
@@ -376,6 +379,7 @@ def _save_details(
         "provenance": {
             "kind": "portrait",
             "sources": [video.path.name],
+            "likeness": settings.likeness,
             "consent": settings.consent,
             "licence": settings.licence,
         },

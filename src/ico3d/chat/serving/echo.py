@@ -20,5 +20,5 @@ async def echo(socket: WebSocket) -> None:
                 if len(text) > LONGEST:
                     break
                 await socket.send_text(text)
-    with contextlib.suppress(RuntimeError):  # it has closed
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # it has closed
         await socket.close()

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import gc
 import socket
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator, Collection, Sequence
 from pathlib import Path
 
 import uvicorn
@@ -23,6 +23,7 @@ from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.network.certificates import Certificate
+from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.running.ending import PatientServer
 from ico3d.chat.serving.sessions import Sessions
@@ -164,17 +165,22 @@ def address(listener: socket.socket, scheme: str = "http") -> str:
 
 
 def make_server(
-    app: Guard, certificate: Certificate | None = None, sessions: Sessions | None = None
+    app: Guard,
+    certificate: Certificate | None = None,
+    proxies: Sequence[str] = (),
+    sessions: Sessions | None = None,
 ) -> uvicorn.Server:
     """A server for `app`, by HTTPS if there is a certificate.
 
     Run it with `server.run(sockets=[listener])`. On SIGTERM the answers of `sessions` are finished
-    first.
+    first. `proxies` are the addresses and networks that are believed where a visitor comes from
+    (X-Forwarded-For); nobody else is.
 
     From then on numpy multiplies matrices in one thread. The server's matrices are small, and
     further threads would busily wait on cores that conversations need.
     """
     threadpool_limits(1, user_api="blas")
+    allow_many_connections()
     config = uvicorn.Config(
         app,
         log_config=None,  # `operator_log` takes what it says
@@ -183,6 +189,9 @@ def make_server(
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,
         server_header=False,
+        http=PromptProtocol,
+        proxy_headers=bool(proxies),
+        forwarded_allow_ips=list(proxies),
         ssl_certfile=certificate.file if certificate else None,
         ssl_keyfile=certificate.key if certificate else None,
     )

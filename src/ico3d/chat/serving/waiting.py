@@ -52,6 +52,7 @@ class WaitingLine:
         free: Callable[[], int],
         most: int = MOST_WAITING,
         kept: float = RESUME_SECONDS,
+        has_share: Callable[[str, int], bool] = lambda *_: True,
     ):
         """Starts empty.
 
@@ -59,8 +60,11 @@ class WaitingLine:
             free: Returns how many more sessions the server may open now.
             most: Largest number of waiting visitors.
             kept: Seconds for which a place is kept after the connection was lost.
+            has_share: Whether a machine may have another place besides its sessions and the given
+                number of places kept for it. Those behind its visitors go first until it may.
         """
         self._free, self._most, self._kept = free, most, kept
+        self._has_share = has_share
         self._waiting: dict[str, Ticket] = {}  # in order
         self._admitted: set[Ticket] = set()
         self.is_closed = False
@@ -83,7 +87,7 @@ class WaitingLine:
         if self.is_closed:
             raise ClosedError
         before = self._waiting.get(id or "")
-        if before is None and self._spare() == 0 and self._is_full(machine):
+        if before is None and self._is_full(machine) and not self._admits(machine):
             raise FullError
         ticket = Ticket(before.id if before else secrets.token_urlsafe(16), machine)
         self._waiting[ticket.id] = ticket  # an id that is known keeps its position
@@ -93,6 +97,10 @@ class WaitingLine:
             before.changed.set()
         self.move_up()
         return ticket
+
+    def knows(self, id: str | None) -> bool:
+        """Whether the place with this id is taken by somebody who waits."""
+        return id in self._waiting
 
     def leave(self, ticket: Ticket, for_good: bool = True) -> None:
         """Gives a place up, or keeps it a while for a page that may come back.
@@ -113,7 +121,9 @@ class WaitingLine:
 
     def move_up(self) -> None:
         """Admits as many as there is room for, and tells all that the queue has moved."""
-        for ticket in [t for t in self._waiting.values() if t.expiry is None][: self._spare()]:
+        for ticket in [t for t in self._waiting.values() if t.expiry is None]:
+            if not self._admits(ticket.machine):
+                continue
             del self._waiting[ticket.id]
             ticket.admitted = True
             self._admitted.add(ticket)
@@ -131,6 +141,11 @@ class WaitingLine:
     def position(self, ticket: Ticket) -> int:
         """Position of a waiting ticket; 1 is the front."""
         return list(self._waiting).index(ticket.id) + 1
+
+    def _admits(self, machine: str) -> bool:
+        """Whether there is a place for a visitor of this machine now."""
+        kept = sum(ticket.machine == machine for ticket in self._admitted)
+        return self._spare() > 0 and self._has_share(machine, kept)
 
     def _is_full(self, machine: str) -> bool:
         same = [ticket for ticket in self._waiting.values() if ticket.machine == machine != ""]
