@@ -35,6 +35,7 @@ MAX_BYTES, MAX_FIRST_BYTES = 12 << 20, 3 << 20
 GESTURES = ("wave", "point", "open_hands", "shrug", "count_three", "nod", "shake", "think")
 """To look at: hands, armpits and neck in poses that nobody recorded."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+MAKER = "the authors of ico3d"
 TRIED = 2
 """Cameras whose pictures are timed before recording."""
 
@@ -122,7 +123,7 @@ class Demo:
         no_clips = to_toml((), self.body_shot.fps, self.body_shot.frames)
         (work / "avatar" / CUTS).write_text(no_clips)
         files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
-        notices = ("--licences", *self.licences)
+        notices = ("--licences", *self.licences, "--made-by", MAKER)
         ico3d("bake", *files, "--strip", work / "strip.png", *notices)
         ico3d("render", self.out, work / "gestures.mp4", "--gestures", *GESTURES)
         check(self.out)

@@ -60,7 +60,8 @@ class RenderMeHead:
             bundle, metrics = head / "head.ico3d", head / "metrics.json"
             timed("train head", recording, head, "--seed", seed, *self.options.split())
             timed("evaluate", head, recording, "--json", metrics, "--images", head / "images")
-            timed("bake", head, recording, bundle, "--strip", head / "strip.png", "--force")
+            strip = ("--strip", head / "strip.png")
+            timed("bake", head, recording, bundle, *strip, "--made-by", "ico3d", "--force")
             loss = Bundle.open(bundle).manifest.loss
             found.append(json.loads(metrics.read_text()) | {"loss": vars(loss) if loss else None})
         print(json.dumps(found, indent=1))

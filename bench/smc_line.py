@@ -67,6 +67,7 @@ class Line:
             work / name for name in ("captures/face", "captures/body", "head", "person")
         )
         bundle, seed = work / "person.ico3d", ("--seed", self.seed)
+        strip = ("--strip", work / "strip.png")
         steps: tuple[tuple[str, tuple[object, ...]], ...] = (
             ("capture check", (files[0],)),
             ("capture check", (files[1],)),
@@ -80,7 +81,7 @@ class Line:
                 (head, body, person, *seed, "--check", work / "check", *self.body.split()),
             ),
             ("evaluate", (person, body, "--images", work / "pictures")),
-            ("bake", (person, face, body, bundle, "--strip", work / "strip.png", "--force")),
+            ("bake", (person, face, body, bundle, *strip, "--made-by", "ico3d", "--force")),
         )
         times = [(verb, round(timed(verb, *words), 1)) for verb, words in steps]
         total = sum(seconds for _, seconds in times)

@@ -23,6 +23,7 @@ class Verb:
 
 VERBS: dict[str, Verb] = {
     "demo": Verb("ico3d.chat.commands", "Demo", "talk with the avatar that comes in the package"),
+    "create": Verb("ico3d.creating.command", "Create", "make an avatar of a video of somebody"),
     "capture portrait": Verb("ico3d.capture.commands", "Portrait", "track a talking-head video"),
     "capture synthetic": Verb("ico3d.studio.command", "Synthetic", "record a synthetic person"),
     "capture import": Verb(
@@ -64,6 +65,7 @@ VERBS: dict[str, Verb] = {
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
     "token": Verb("ico3d.chat.commands", "Token", "make a token for pages that embed an avatar"),
+    "doctor": Verb("ico3d.chat.doctor.command", "Doctor", "check a machine or a deployment"),
     "weights list": Verb(
         "ico3d.common.downloads.commands", "ListWeights", "weights that can be used"
     ),

@@ -59,6 +59,10 @@ class ProtocolError(Ico3dError):
     """A message on the wire is malformed or over its limits."""
 
 
+class DiagnosisError(Ico3dError):
+    """A machine or a deployment has something to mend."""
+
+
 class ServiceError(Ico3dError):
     """A service of the conversation failed at its job."""
 

@@ -13,6 +13,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
+from support.avatars.origins import about
 from support.avatars.planted import (
     PlantedCapture,
     planted_blendshape_head,
@@ -47,7 +48,6 @@ def baked(request, tmp_path_factory):
     samples = recorded_samples(head, capture)
     result = head_bundle.bake(head, views, samples, 8, [].append, quick)
     out = folder / "planted.ico3d"
-    head_bundle.write(
-        out, "Planted", result, samples, head, capture, load_persona(None), "A notice."
-    )
+    told = about(load_persona(None), capture.provenance, name="Planted", notices="A notice.")
+    head_bundle.write(out, result, samples, head, capture, told)
     return head, capture, Bundle.open(out)

@@ -17,6 +17,7 @@ from ico3d.body.model_folder import TrainedBody
 from ico3d.body.training.train_clip import train_body
 from ico3d.bundle.format import Bundle
 from ico3d.cli import main
+from support.avatars.origins import MADE
 from support.avatars.whole_person import WholeFilmed, head_recording, write_whole_person
 from support.bodies.tiny_training import job
 from support.bodies.tracked_capture import TrackedCapture
@@ -95,7 +96,7 @@ def test_the_verbs_bake_film_and_animate_there(cuda, folder, tmp_path, monkeypat
     monkeypatch.setattr(person_bundle, "VIEWS", 4)
     monkeypatch.setattr(body_bundle, "SHAPES", body_bundle.SHAPES[:1])
     bundle, film = tmp_path / "a.ico3d", tmp_path / "a.mp4"
-    bake = ("bake", folder, "head", "body", bundle, "--rank", 4, "--force")
+    bake = ("bake", folder, "head", "body", bundle, "--rank", 4, "--force", *MADE)
     small = ("--size", 32, "--seconds", 0.1)
     _run_there(monkeypatch, *bake, "--strip", tmp_path / "strip.png")
     for avatar in (folder, bundle):
@@ -110,7 +111,7 @@ def test_the_verbs_do_so_for_a_body_on_a_skeleton(cuda, tmp_path, monkeypatch):
     body, bundle = tmp_path / "body", tmp_path / "a.ico3d"
     train_body(capture, body, job("skinned"))
     _run_there(monkeypatch, "evaluate", body, "capture", "--json", tmp_path / "figures.json")
-    _run_there(monkeypatch, "bake", body, "capture", bundle)
+    _run_there(monkeypatch, "bake", body, "capture", bundle, *MADE)
     for avatar in (body, bundle):
         film = ("render", avatar, tmp_path / "a.mp4", "--size", 32, "--seconds", 0.1)
         _run_there(monkeypatch, *film)

@@ -52,7 +52,8 @@ def many_cameras(face: Path, body: Path, work: Path) -> None:
         resize_capture(recorded, folder, SIZE, 2)
         shutil.rmtree(folder / "masks")
         about = json.loads((folder / "cameras.json").read_text())
-        (folder / "cameras.json").write_text(json.dumps({**about, "shows": shows}))
+        told = {"shows": shows, "likeness": "Anna", "consent": "written", "licence": "ours"}
+        (folder / "cameras.json").write_text(json.dumps(about | told))
     shutil.copy(face / "audio.wav", work / "speech.wav")
 
 

@@ -18,7 +18,7 @@ SMALL = {
     "assemble": BODY,
     "bake": "--force",  # what has hardly been trained breaks the bounds of quality
     "render": "--size 64 --fps 5",
-    "serve": "--port 0 --no-open",
-    "demo": "--port 0 --no-open",
+    "serve": "--port 0 --no-browser",
+    "demo": "--port 0 --no-browser",
     "serve-module": "--port 0 --host 127.0.0.1",
 }

@@ -70,6 +70,8 @@ def test_many_cameras(face, body, tracker, tmp_path, monkeypatch):
     recordings.many_cameras(face, body, tmp_path)
     guide.follow("many-cameras.md", SMALL, _tracked(tracker, face=face, body=body))
     assert _is_whole("anna.ico3d")
+    provenance = Bundle.open(Path("anna.ico3d")).manifest.provenance
+    assert (provenance.likeness, provenance.made_by) == ("Anna", "Our studio")
     assert all(_shows_something(p) for p in ("strip.png", "gestures.jpg", *Path("check").iterdir()))
     assert Path("film.mp4").stat().st_size > 1000
 

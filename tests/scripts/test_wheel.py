@@ -77,7 +77,7 @@ def test_the_checkout_is_out_of_reach(installed):
 def test_the_packaged_avatar_is_served(installed, tmp_path):
     folder, variables = installed
     (tmp_path / "settings.toml").write_text(STAND_INS)
-    words = ["demo", "--port", "0", "--settings", "settings.toml", "--no-open"]
+    words = ["demo", "--port", "0", "--settings", "settings.toml", "--no-browser"]
     command = [sys.executable, "-S", str(folder / "bin" / "ico3d"), *words]
     with subprocess.Popen(
         command, env=variables, cwd=tmp_path, stdout=subprocess.PIPE, text=True

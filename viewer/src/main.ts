@@ -16,6 +16,7 @@ declare global {
   }
 }
 
+const secrets = new URLSearchParams(location.hash.slice(1)); // what browsers send nowhere
 const parameters = new URL(location.href).searchParams;
 const visit: Visit = new Visit(document.body, new Server(new URL(location.href)), {
   draw: parameters.get('draw'),
@@ -29,6 +30,11 @@ const visit: Visit = new Visit(document.body, new Server(new URL(location.href))
     if (seconds !== null) void import('./bench.ts').then(({ bench }) => bench(presence, Number(seconds) || undefined));
   },
   reload: () => location.reload(),
+  key: secrets.get('key'),
+  unlock: (key) => {
+    location.hash = new URLSearchParams({ key }).toString();
+    location.reload();
+  },
 });
 
 addEventListener('pagehide', ({ persisted }) => persisted || visit.dispose());

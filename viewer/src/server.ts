@@ -21,6 +21,11 @@ export class Server {
     return url.href;
   }
 
+  /** Address that gives tokens to those who have the key. */
+  tokens(): string {
+    return new URL('token', this.base).href;
+  }
+
   /** Address of the page that checks the visitor's device. */
   check(): string {
     return new URL('check', this.base).href;

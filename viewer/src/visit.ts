@@ -1,3 +1,4 @@
+import { admit, byKey } from './admission.ts';
 import type { Body } from './body/body.ts';
 import type { SkinnedBody } from './body/skinned/body.ts';
 import { BundleFiles, filesToFirstSight, loadManifest, THUMBNAIL } from './bundle/load.ts';
@@ -12,7 +13,7 @@ import { PAINTERS } from './painters/paths.ts';
 import { choosePath, rememberWish, wishOf, type Wish } from './stage/choosing.ts';
 import type { Drawing } from './stage/painting.ts';
 import type { Stage } from './stage/stage.ts';
-import { Conversation } from './talk/conversation.ts';
+import { Conversation, type ConversationView } from './talk/conversation.ts';
 import type { Emit } from './talk/events.ts';
 import { telling } from './talk/telling.ts';
 import { watchCover } from './ui/cover.ts';
@@ -21,18 +22,25 @@ import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { offerDrawing } from './ui/sheets/drawing.ts';
+import { showOrigin } from './ui/sheets/origin.ts';
 import { makeThemeButton, showTheme } from './ui/theme.ts';
 import type { PageWords } from './words/page-words.ts';
-import { say, type Sentence } from './words/text.ts';
+import { codeOf, say, type Sentence } from './words/text.ts';
 import { offerXr } from './xr/offer.ts';
 import type { Path } from './soft/contract.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
+
+/** States of a conversation in which an answer is worked out. */
+const AT_WORK: ReadonlySet<string> = new Set(['listening', 'thinking']);
 
 /** Who is there, once they can be seen. */
 export interface Presence extends Cast {
   stage: Stage;
   conversation?: Conversation; // none of a body alone
 }
+
+/** What is wrong where a key helps. */
+const LOCKED = new Set<string>(['error.refused', 'error.key']);
 
 type Theatre = typeof import('./theatre.ts');
 
@@ -58,6 +66,10 @@ export interface VisitPorts {
   failed?(sentence: Sentence): void;
   /** Loads everything anew, where nothing else helps. */
   reload(): void;
+  /** The server's key, if the visitor has one. */
+  key?: string | null;
+  /** Tries a key that the visitor types; only where he may have one. */
+  unlock?(key: string): void;
 }
 
 /**
@@ -96,7 +108,7 @@ export class Visit {
     const { signal } = this.ending;
     const coming = import('./theatre.ts'); // meanwhile the first files are asked for
     coming.catch(() => {}); // heard of below
-    const told = loadManifest(server.file.bind(server), signal);
+    const told = this.loadManifest();
     const wish = wishOf(this.ports.draw);
     const drawing = drawingOf(wish);
     drawing.catch(() => {}); // heard of below
@@ -105,6 +117,7 @@ export class Visit {
     const name = nameOf(manifest);
     byId(root, 'name').textContent = name;
     root.style.setProperty('--backdrop', cssColour(manifest.background));
+    showOrigin(root, words, manifest.provenance);
     this.overlay.greet(manifest, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
     this.ports.named(name);
 
@@ -117,7 +130,7 @@ export class Visit {
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
     const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '' }, this.overlay, () => stage.figures, signal);
-    const conversation = manifest.head ? this.converse(page) : undefined;
+    const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };
     const corner = root.querySelector<HTMLElement>('.figures')!;
     corner.append(
@@ -135,6 +148,13 @@ export class Visit {
     this.overlay.hide();
     if (conversation) page.talk(conversation);
     else focusOn(byId(root, 'play'));
+  }
+
+  private async loadManifest(): Promise<Manifest> {
+    const { server, ports } = this;
+    const { signal } = this.ending;
+    if (ports.key) await admit(server, byKey(server, ports.key), say('error.key'), signal);
+    return loadManifest(server.file.bind(server), signal);
   }
 
   /** Something else is to draw from now on; the talk goes on. */
@@ -167,8 +187,13 @@ export class Visit {
     this.root.dataset.path = stage.painter.path;
   }
 
-  private converse(page: Page): Conversation {
-    const conversation = new Conversation(() => this.server.socket(), telling(page.view, this.ports.emit), this.ports.emit);
+  private converse(page: Page, stage: Stage): Conversation {
+    const state: ConversationView['state'] = (state) => {
+      page.view.state(state);
+      stage.spare(AT_WORK.has(state));
+    };
+    const view = telling(Object.assign(Object.create(page.view) as ConversationView, { state }), this.ports.emit);
+    const conversation = new Conversation(() => this.server.socket(), view, this.ports.emit);
     atEnd(this.ending.signal, () => conversation.dispose());
     return conversation;
   }
@@ -226,8 +251,11 @@ export class Visit {
   private fail(error: unknown): void {
     if (this.ending.signal.aborted) return;
     if (!(error instanceof PageError)) console.error(error);
-    this.overlay.fail(sentenceOf(error));
-    this.ports.failed?.(sentenceOf(error));
+    const sentence = sentenceOf(error);
+    const { unlock } = this.ports;
+    if (unlock && LOCKED.has(codeOf(sentence))) this.overlay.askKey(sentence, unlock);
+    else this.overlay.fail(sentence);
+    this.ports.failed?.(sentence);
   }
 }
 

@@ -12,6 +12,7 @@ const ORDER = [
   ['half.ts', 'gaussians', 'remembered.ts'],
   ['words'],
   ['protocol.ts', 'shared.ts', 'errors.ts', 'actor.ts', 'lifetime.ts', 'server.ts'],
+  ['admission.ts'],
   ['soft'],
   ['bundle'],
   ['rig'],

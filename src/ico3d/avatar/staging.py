@@ -1,18 +1,16 @@
 """How a baked avatar is presented: idle motion, the visitor's camera, background, thumbnail."""
 
 import io
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 import torch
 from PIL import Image
 
 from ico3d.avatar.render_bundle import visitor_camera
-from ico3d.bundle.manifest import CameraInfo, Provenance
+from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 from ico3d.common.spread import spread
-from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
@@ -103,41 +101,6 @@ def standing_view(
     reach = np.linalg.norm(high - low) / 2 * _BODY_MARGIN
     eye = middle + toward * reach / np.tan(np.deg2rad(_BODY_FOV) / 2)
     return CameraInfo(triple(eye), triple(middle), triple(up), _BODY_FOV)
-
-
-def provenance(about: dict, where: str) -> Provenance:
-    """Provenance of a recording, in the form of the manifest.
-
-    Args:
-        about: Keys `kind`, `sources`, `consent` and `licence`.
-        where: Where `about` comes from, for the error message.
-
-    Raises:
-        BundleError: If a key is missing.
-    """
-    try:
-        return Provenance(
-            kind=str(about["kind"]),
-            sources=tuple(str(source) for source in about["sources"]),
-            consent=str(about["consent"]),
-            licence=str(about["licence"]),
-        )
-    except (KeyError, TypeError) as error:
-        raise BundleError(f"{where}: its provenance lacks {error}.") from error
-
-
-def joint_provenance(parts: Sequence[Provenance]) -> Provenance:
-    """Provenance of a person made from several recordings; what they share is said once."""
-
-    def said(values: Iterable[str]) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(values))
-
-    return Provenance(
-        kind=", ".join(said(part.kind for part in parts)),
-        sources=said(source for part in parts for source in part.sources),
-        consent="; ".join(said(part.consent for part in parts)),
-        licence="; ".join(said(part.licence for part in parts)),
-    )
 
 
 def thumbnail(

@@ -57,6 +57,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         number of windows, 0 without a body or with one on a skeleton; `body_gaussians` of each
         window, or of the body on a skeleton; `provenance`.
     """
+    from ico3d.bundle.people.provenance import provenance_to_json
     from ico3d.common.typed import plain
 
     manifest = bundle.manifest
@@ -78,7 +79,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         "animation": bundle.animation is not None,
         "background": bundle.background,
         "loss": plain(manifest.loss),
-        "provenance": plain(manifest.provenance),
+        "provenance": provenance_to_json(manifest.provenance),
         "files": sizes,
     }
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 from ico3d.bundle import limits
+from ico3d.bundle.people.provenance import Provenance, provenance_to_json, with_newer
 from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
 from ico3d.bundle.skinned.info import SkinnedInfo, check_skinned
 from ico3d.common.typed import Rules, fill, parse_json, plain
@@ -162,16 +163,6 @@ class Loss:
 
 
 @dataclass(frozen=True)
-class Provenance:
-    """Origin of the avatar: kind of subject, sources, consent, licence."""
-
-    kind: str
-    sources: tuple[str, ...]
-    consent: str
-    licence: str
-
-
-@dataclass(frozen=True)
 class Manifest:
     """`manifest.json` of a head, a body, or both; `write_bundle` fills in `files`.
 
@@ -204,7 +195,11 @@ class Manifest:
 
     def to_json(self) -> bytes:
         """The manifest as UTF-8 JSON; equal manifests give equal bytes."""
-        value = {**plain(self), "persona": without_defaults(self.persona)}
+        value = {
+            **plain(self),
+            "persona": without_defaults(self.persona),
+            "provenance": provenance_to_json(self.provenance),
+        }
         return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode()
 
     @staticmethod
@@ -230,6 +225,8 @@ class Manifest:
         value = {**value, "version": VERSION, **dict.fromkeys(missing)}
         if "persona" in value:
             value = {**value, "persona": with_defaults(value["persona"])}
+        if "provenance" in value:
+            value = {**value, "provenance": with_newer(value["provenance"])}
         manifest = fill(Manifest, value, MANIFEST, Rules(BundleError))
         check_manifest(manifest)
         return manifest

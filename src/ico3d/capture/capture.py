@@ -14,6 +14,7 @@ from ico3d.capture.finding import Finding
 from ico3d.capture.smplx import SmplX
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES as EYE_NAMES
+from ico3d.common.people.stated import NOT_STATED
 from ico3d.rig.body_track import BodyTrack, read_body_track
 
 
@@ -182,7 +183,8 @@ class Capture(ABC):
     @property
     def provenance(self) -> dict:
         """Who was recorded, how, and under which licence; copied into a bundle's manifest."""
-        return {"kind": self.kind, "sources": [], "consent": "", "licence": ""}
+        blank = dict.fromkeys(("likeness", "consent", "licence"), NOT_STATED)
+        return {"kind": self.kind, "sources": [], **blank}
 
 
 class RecordedCapture(Capture):

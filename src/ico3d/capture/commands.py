@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from ico3d.common.device import DeviceName
+from ico3d.common.people.stated import NOT_STATED
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,10 @@ class Portrait:
         intrinsics: Focal length in pixels of the video, or "estimated".
         size: Upper limit of the pictures' short side in pixels.
         refine: Correct the poses by pictures of the whole head, which takes a minute or more.
-        consent: What the person agreed to; goes into the avatar's manifest.
+        likeness: Who the person is; goes into the avatar's manifest, and ico3d forget finds by this
+            name what belongs to the person.
+        consent: What the person agreed to, and how: "agreed in writing on 2026-11-24 to …"; goes
+            into the avatar's manifest.
         licence: Licence of the recording; goes into the avatar's manifest.
         device: Where to correct the poses: by default CUDA where that works, else the CPU.
     """
@@ -32,16 +36,18 @@ class Portrait:
     intrinsics: float | Literal["estimated"] = "estimated"
     size: int = 512
     refine: bool = True
-    consent: str = "not stated"
-    licence: str = "not stated"
+    likeness: str = NOT_STATED
+    consent: str = NOT_STATED
+    licence: str = NOT_STATED
     device: DeviceName = "auto"
 
     def run(self) -> None:
         """Tracks the video and writes the folder."""
-        from ico3d.capture.portrait.track import PortraitSettings, track_portrait
+        from ico3d.capture.portrait.settings import PortraitSettings
+        from ico3d.capture.portrait.track import track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
-        about = (self.consent, self.licence)
+        about = (self.likeness, self.consent, self.licence)
         settings = PortraitSettings(self.size, focal, self.refine, *about, self.device)
         track_portrait(self.video, self.out, settings)
 

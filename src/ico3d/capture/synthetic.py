@@ -15,6 +15,7 @@ from ico3d.capture.decoding import DAMAGED, unit
 from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
+from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
 
@@ -66,6 +67,7 @@ class SyntheticCapture(RecordedCapture):
         return {
             "kind": self.kind,
             "sources": list(self._about["sources"]),
+            "likeness": NOBODY,
             "consent": "not needed: no such person exists",
             "licence": str(self._about.get("licence", "")),
         }

@@ -29,7 +29,7 @@ class Serve:
         settings: TOML or JSON file that chooses services and timing.
         persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
         allow_origin: Sites whose pages may embed the avatar, such as https://example.org.
-        open: Open the page in a browser.
+        browser: Open the page in a browser.
         log: File to which a line of JSON is appended for each turn, with times and counts but no
             words.
         verbose: Print all log messages, including what visitors say.
@@ -37,8 +37,18 @@ class Serve:
             page, with a certificate that this machine makes, keeps and renews.
         tls_cert: PEM file of a certificate to serve by HTTPS with, and of its chain.
         tls_key: PEM file of its private key.
+        metrics_port: Port on which Prometheus gets figures, without words of visitors; 0 takes any
+            free port, by default nobody gets them.
+        metrics_host: Address on which it gets them.
+        json_log: Write warnings and errors as lines of JSON.
         name: Host names, besides this machine's addresses, under which visitors come, such as those
             of a proxy, a tunnel or `machine.local`.
+        proxy: Addresses or networks of proxies that encrypt and tell where visitors come from
+            (X-Forwarded-For); nobody else is believed.
+        open: Admit everybody who reaches the server; else visitors from other machines have to
+            show a key: that of the settings, or one that is made anew at each start and printed.
+        without_consent: Serve the avatar although its bundle does not say that the person it shows
+            agreed.
     """
 
     bundle: Annotated[Path, tyro.conf.Positional]
@@ -47,58 +57,77 @@ class Serve:
     settings: Path | None = None
     persona: Path | None = None
     allow_origin: tuple[str, ...] = ()
-    open: bool = False
+    browser: bool = False
     log: Path | None = None
     verbose: bool = False
     tls: bool = False
     tls_cert: Path | None = None
     tls_key: Path | None = None
+    metrics_port: int | None = None
+    metrics_host: str = "127.0.0.1"
+    json_log: bool = False
     name: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    proxy: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    open: bool = False
+    without_consent: bool = False
 
     def run(self) -> None:
         """Serves until interrupted.
 
         Raises:
-            Ico3dError: If the bundle, the settings or the port cannot be used, or a service cannot
-                be started.
+            Ico3dError: If the bundle, the settings or the port cannot be used, the bundle states no
+                consent, or a service cannot be started.
         """
-        set_up_log(self.verbose)
+        set_up_log(self.verbose, self.json_log)
         from ico3d.bundle.format import Bundle
+        from ico3d.bundle.people.provenance import check_consent
         from ico3d.bundle.persona import read_persona
         from ico3d.chat.observing.monitor import Monitor, TurnLog
         from ico3d.chat.parts import make_parts, warm_up
         from ico3d.chat.services.offers import offers
         from ico3d.chat.serving import server
-        from ico3d.chat.serving.network.reach import find_reach
+        from ico3d.chat.serving.network.reach import find_reach, fragment
         from ico3d.chat.serving.sessions import Sessions
-        from ico3d.chat.serving.sites import open_sites
+        from ico3d.chat.serving.sites import open_sites, shown_key
         from ico3d.chat.settings.conversation import read_settings
 
         settings = read_settings(self.settings)
-        sites = open_sites(with_origins(settings.embedding, self.allow_origin))
         persona = read_persona(self.persona) if self.persona else None
         monitor = Monitor(TurnLog.open(self.log) if self.log else None)
-        reach = find_reach(self.host, self.name, self.tls, self.tls_cert, self.tls_key)
+        tls = self.tls, self.tls_cert, self.tls_key
+        reach = find_reach(self.host, self.name, *tls, self.proxy, self.open)
+        embedding = with_origins(settings.embedding, self.allow_origin)
+        key = shown_key(reach.is_public, self.open, embedding)
+        sites = open_sites(embedding, key or "")
         listener = server.bind(self.host, self.port)
+        port = self.metrics_port
+        figures = None if port is None else monitor.publish(self.metrics_host, port)
         bundle = Bundle.open(self.bundle)
+        if not self.without_consent:
+            check_consent(bundle.manifest.provenance, self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
         parts = make_parts(avatar) if avatar else None  # loads what they need, too
+        if parts:
+            warm_up(parts)
         app = server.make_app(bundle, avatar, self.host, sessions, sites, reach.answered)
         url = server.address(listener, reach.scheme)
         listener.listen()  # whoever reads the address and comes at once is served in a moment
-        print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
-        print("\n".join(reach.told(listener.getsockname()[1], sites.asks_for_tokens)))
+        name = (persona or bundle.manifest.persona).name
+        print(f"{name} is at {url}{fragment(key)} (Ctrl+C ends)")
+        print("\n".join(reach.told(listener.getsockname()[1], key)))
+        if figures:
+            print(f"Prometheus finds figures at {figures}")
         if avatar and parts:
-            warm_up(parts)
             offered = offers(settings, avatar.persona.voice)
             print("\n".join(described(parts.services, offered)))
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()
-        if self.open:
-            webbrowser.open(url)
-        server.make_server(app, reach.certificate).run(sockets=[listener])
+        if self.browser:
+            admission = f"?token={sites.token('')[0]}" if sites.asks_for_tokens else ""
+            webbrowser.open(url + admission)
+        server.make_server(app, reach.certificate, reach.proxies, sessions).run(sockets=[listener])
 
 
 @dataclass(frozen=True)
@@ -138,22 +167,24 @@ class Demo:
         port: Port to listen on; 0 takes any free port.
         settings: TOML or JSON file that chooses services and timing.
         persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
-        open: Open the page in a browser.
+        browser: Open the page in a browser.
         verbose: Print all log messages, including what visitors say.
         natural: Listen with Whisper, think with the persona's notes and a small language model,
             and speak with a natural voice, in English; what is missing is installed first, after
             its sizes and licences have been shown and you have agreed.
         yes: Agree to that without being asked.
+        open: Admit everybody who reaches the server; `ico3d serve demo` can admit by a key.
     """
 
     host: str = "127.0.0.1"
     port: int = 8765
     settings: Path | None = None
     persona: Path | None = None
-    open: bool = True
+    browser: bool = True
     verbose: bool = False
     natural: bool = False
     yes: bool = False
+    open: bool = False
 
     def run(self) -> None:
         """Serves the packaged avatar until interrupted.
@@ -175,7 +206,7 @@ class Demo:
             prepare(self.yes)
             settings = SETTINGS
         where = (self.host, self.port, settings, self.persona)
-        Serve(demo, *where, open=self.open, verbose=self.verbose).run()
+        Serve(demo, *where, browser=self.browser, open=self.open, verbose=self.verbose).run()
 
 
 def with_origins(embedding: "Embedding", origins: tuple[str, ...]) -> "Embedding":

@@ -2,8 +2,10 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from functools import singledispatchmethod
 
+import numpy as np
 from loguru import logger
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.pipeline.pipeline import Pipeline
@@ -37,6 +39,7 @@ from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.speaker import Speaker
+from ico3d.chat.supervision.allowance import Allowance
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
 from ico3d.chat.tools import functions
@@ -60,7 +63,7 @@ from ico3d.chat.wire.protocol import (
     Talk,
     Text,
 )
-from ico3d.chat.wire.sentences import VOICELESS
+from ico3d.chat.wire.sentences import HASTY, VOICELESS
 from ico3d.chat.workers import at_once
 from ico3d.errors import ProtocolError
 
@@ -71,7 +74,13 @@ class Conversation:
     """The pipeline of one session: handles the page's messages and sends others to the `Page`."""
 
     def __init__(
-        self, avatar: Avatar, page: Page, visitor: Visitor, ended: Callable[[], None], seed: int
+        self,
+        avatar: Avatar,
+        page: Page,
+        visitor: Visitor,
+        ended: Callable[[], None],
+        seed: int,
+        allowance: Allowance,
     ):
         """Creates a conversation that has not started.
 
@@ -81,7 +90,9 @@ class Conversation:
             visitor: Counts events for the operator's figures.
             ended: Called if the pipeline ends by itself, without `close`.
             seed: Seed of random movements of eyes, brows and body.
+            allowance: How much the visitor may ask.
         """
+        self._allowance, self._unheard = allowance, False
         self._avatar, self._page, self._ended, self._seed = avatar, page, ended, seed
         self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
         self.activity = Activity(now)
@@ -116,7 +127,7 @@ class Conversation:
                 audio_in_sample_rate=MICROPHONE_RATE, audio_out_sample_rate=SPEECH_RATE
             ),
             clock=PipelineClock(self._now),
-            observers=[self._timing, self.activity],
+            observers=[self._timing, self.activity, self._allowance],
             enable_rtvi=False,
             enable_turn_tracking=False,
             idle_timeout_secs=None,
@@ -157,6 +168,8 @@ class Conversation:
 
     @handle.register
     async def _audio(self, message: Audio) -> None:
+        if not self._may_ask():  # a turn that has begun ends with the silence
+            message = replace(message, pcm=np.zeros_like(message.pcm))
         await self._input.hear(message)
 
     @handle.register
@@ -164,8 +177,9 @@ class Conversation:
         question = message.text.strip()
         if not question:
             raise ProtocolError("text: is empty.")
-        self.activity.touch()
-        await self._input.ask(question)
+        if self._may_ask():
+            self.activity.touch()
+            await self._input.ask(question)
 
     @handle.register
     async def _say(self, message: Say) -> None:
@@ -174,19 +188,25 @@ class Conversation:
             raise ProtocolError("say: this server's settings do not allow it.")
         if not text:
             raise ProtocolError("say: is empty.")
+        if not self._may_ask():
+            return
+        self._allowance.spend()
         self.activity.touch()
         await self._input.interrupt()
         await self._input.say(text)
 
     @handle.register
     async def _interrupt(self, message: Interrupt) -> None:
-        self.activity.touch()
-        if message.utterance is None or self._speaker.is_speaking(message.utterance):
+        speaking = self._speaker.is_speaking(message.utterance)
+        if speaking:
+            self.activity.touch()  # on nothing it would hold a place for ever
+        if message.utterance is None or speaking:
             await self._input.interrupt()
 
     @handle.register
     async def _clock(self, message: Clock) -> None:
-        self.activity.touch()  # it comes only while something plays
+        if self._speaker.is_speaking(message.utterance):
+            self.activity.touch()
         self._speaker.clock(message)
         self._timing.heard(message.utterance, message.position)
 
@@ -202,6 +222,14 @@ class Conversation:
         if isinstance(message, Deaf):
             logger.info(f"the browser does not recognise speech: {message.reason!r}")
         await self._input.pass_on(message)  # to the BrowserRecognition
+
+    def _may_ask(self) -> bool:
+        """Whether the visitor is heard; tells him once if he has asked too much."""
+        may = self._allowance.may_ask()
+        if not may and not self._unheard:
+            self._page.send(HASTY.error(fatal=False))
+        self._unheard = not may
+        return may
 
     def hold(self) -> None:
         """Pauses playback estimates, because the connection was lost."""
@@ -256,7 +284,11 @@ class Conversation:
                 user,
                 parts.language,
                 AnswerGuard(
-                    parts.recognition, parts.language, settings.patience, self._apology_language()
+                    parts.recognition,
+                    parts.language,
+                    settings.patience,
+                    self._apology_language(),
+                    settings.limits.answer_letters,
                 ),
                 ClauseProcessor(self._language()),
                 parts.voice,

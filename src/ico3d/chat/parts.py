@@ -6,7 +6,6 @@ models loaded, so while visitors talk it is done in threads.
 
 import asyncio
 import contextlib
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -110,16 +109,13 @@ def make_parts(avatar: Avatar) -> Parts:
 
 
 def warm_up(parts: Parts) -> None:
-    """Has a language model on a server answer once, in a thread, before visitors ask."""
-
-    def ask(model: WarmsUp) -> None:
-        try:
-            asyncio.run(asyncio.wait_for(model.warm_up(), SLOWEST))
-        except Exception as error:  # a visitor's question may fare better
-            logger.warning(f"language did not answer a first question: {cause(error)}")
-
-    if isinstance(parts.language, WarmsUp):
-        threading.Thread(target=ask, args=(parts.language,), daemon=True).start()
+    """Has a language model on a server answer once, before visitors ask; may take minutes."""
+    if not isinstance(parts.language, WarmsUp):
+        return
+    try:
+        asyncio.run(asyncio.wait_for(parts.language.warm_up(), SLOWEST))
+    except Exception as error:  # a visitor's question may fare better
+        logger.warning(f"language did not answer a first question: {cause(error)}")
 
 
 async def make_aside(avatar: Avatar) -> Parts:

@@ -13,6 +13,7 @@ from ico3d.cli import main
 from ico3d.motion.gestures.library import library
 from ico3d.motion.person import person_of
 from ico3d.motion.recorded.cut import Cut
+from support.avatars.origins import MADE, origin
 from support.avatars.whole_person import write_whole_person
 from support.bodies.skinned_model import trained_like
 from support.recorded import body_of, made_still
@@ -29,7 +30,7 @@ def body(tmp_path):
     person = person_of(rig)
     rotations = made_still(person, library(person, ("wave",))["wave"], FPS)
     model = trained_like(body_of(rig, FPS, rotations, 0 * rotations[:, 0, :3], 60))
-    about = {"kind": "computed", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
+    about = origin("computed")
     windows = (Window(0, len(rotations) - 1),)
     folder = tmp_path / "body"
     folder.mkdir()
@@ -63,14 +64,14 @@ def test_clips_are_shown_renamed_and_baked(body, tmp_path, capsys, monkeypatch):
     out, again = tmp_path / "a.ico3d", tmp_path / "again.toml"
     some = partial(library, names=("wave",))
     monkeypatch.setattr("ico3d.bundle.skinned.gestures.library", some)
-    assert main(["bake", str(body), str(out), "--device", "cpu", "--force"]) == 0
+    assert main(["bake", str(body), str(out), "--device", "cpu", "--force", *MADE]) == 0
     bundle = Bundle.open(out)
     assert bundle.gestures is not None and {"take_a_bow", "wave"} <= set(bundle.gestures)
     assert main(["animate", str(out), "--clips", str(again)]) == 0
     assert again.read_text() == file.read_text()
     file.write_text(file.read_text().replace("num_frames = ", "num_frames = 1"))
     capsys.readouterr()
-    for verb in (["animate", str(body)], ["bake", str(body), str(out), "--device", "cpu"]):
+    for verb in (["animate", str(body)], ["bake", str(body), str(out), *MADE, "--device", "cpu"]):
         assert main(verb) == 1
         assert "is of a recording of" in " ".join(capsys.readouterr().err.split())
 

@@ -22,6 +22,7 @@ from ico3d.errors import BundleError
 from ico3d.splat.render import render
 from support.avatars.filmed_person import NOISE, SIZE, FilmedPerson
 from support.avatars.moving_body import FPS, MovingPerson
+from support.avatars.origins import MADE, about
 
 pytestmark = pytest.mark.slow
 
@@ -37,9 +38,9 @@ def filmed(person, tmp_path_factory):
     folder = tmp_path_factory.mktemp("body")
     capture = FilmedPerson(person, folder / "capture")
     results = list(body_bundle.bake(person, capture))
-    persona = Persona("Swinger", "", ())
     parts = body_bundle.parts_of(results, person)
-    body_bundle.write(folder / "a.ico3d", persona, parts, person, capture, "A notice.")
+    told = about(Persona("Swinger"), capture.provenance, notices="A notice.")
+    body_bundle.write(folder / "a.ico3d", parts, capture, told)
     return person, capture, results, Bundle.open(folder / "a.ico3d")
 
 
@@ -204,7 +205,7 @@ def trained_body(folder: Path, log_duration: float) -> None:
 def test_a_model_folder_becomes_a_bundle_at_the_command_line(tmp_path, capsys):
     trained_body(tmp_path / "model", 8.0)
     out, strip = tmp_path / "flying.ico3d", tmp_path / "strip.png"
-    assert main(["bake", str(tmp_path / "model"), str(out), "--strip", str(strip)]) == 0
+    assert main(["bake", str(tmp_path / "model"), str(out), "--strip", str(strip), *MADE]) == 0
     bundle = Bundle.open(out)
     assert bundle.manifest.name == "flying" and bundle.manifest.provenance.kind == "filmed"
     assert [w.num_gaussians for w in bundle.manifest.body.windows] == [40, 40]
@@ -215,7 +216,7 @@ def test_a_model_folder_becomes_a_bundle_at_the_command_line(tmp_path, capsys):
 
 def test_gaussians_that_come_and_go_are_refused(tmp_path, capsys):
     trained_body(tmp_path, -1.0)
-    assert main(["bake", str(tmp_path), str(tmp_path / "a.ico3d")]) == 1
+    assert main(["bake", str(tmp_path), str(tmp_path / "a.ico3d"), *MADE]) == 1
     assert "come and go" in capsys.readouterr().err
     assert not (tmp_path / "a.ico3d").exists()
 

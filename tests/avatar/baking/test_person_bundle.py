@@ -25,6 +25,7 @@ from ico3d.common.psnr import psnr
 from ico3d.errors import BundleError
 from ico3d.splat.render import render
 from support.avatars.filmed_person import NOISE, SIZE
+from support.avatars.origins import MADE, about, origin
 from support.avatars.planted import driving
 from support.avatars.whole_person import (
     FPS,
@@ -59,7 +60,7 @@ def baked(avatar, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         open_with(patch, lambda path: recordings[Path(path).name])
         patch.setattr(head_bundle, "BakeSettings", lambda: QUICK)
-        words = [folder, "head", "body", out / "a.ico3d", "--strip", out / "strip.png"]
+        words = [folder, "head", "body", out / "a.ico3d", "--strip", out / "strip.png", *MADE]
         assert main(["bake", *map(str, words), "--rank", "16", "--name", "Both", "--force"]) == 0
     return Bundle.open(out / "a.ico3d"), out / "strip.png", person, recordings["body"]
 
@@ -163,14 +164,15 @@ def test_without_a_recording_voices_say_how_the_face_moves(avatar):
 def test_a_body_on_a_skeleton_carries_the_head(baked, tmp_path):
     """The baked head goes to its recorded poses, the body is the one on the skeleton."""
     bundle, _, person, _ = baked
-    model, about = trained_like(capsule_person(300, FRAMES)), person.body.summary
-    body = TrainedBody([model], (Window(0, FRAMES - 1),), FPS, "skinned", about)
+    model, summary = trained_like(capsule_person(300, FRAMES)), person.body.summary
+    body = TrainedBody([model], (Window(0, FRAMES - 1),), FPS, "skinned", summary)
     whole = replace(person, body=body)
     parts = skinned_bundle.bake(body, None, person_bundle.head_at(whole)).parts
     result = person_bundle.put_together(whole, bundle.head, parts, whole.expressions, None)
-    persona, out = load_persona(None), tmp_path / "a.ico3d"
+    out = tmp_path / "a.ico3d"
     animation = Animation(FPS, FRAMES, Rest(2, 5), ())
-    person_bundle.write(out, whole, result, animation, None, (persona, "Both", ""))
+    told = about(load_persona(None), origin("planted"))
+    person_bundle.write(out, whole, result, animation, None, told)
     found = Bundle.open(out)
     assert found.manifest.is_whole and found.manifest.body is None and found.skinned is not None
     drawn = avatar_gaussians(found, 4 / FPS, np.zeros(39))

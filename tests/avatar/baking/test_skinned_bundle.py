@@ -24,6 +24,7 @@ from ico3d.common.psnr import psnr
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
+from support.avatars.origins import MADE, origin
 from support.bodies.skinned_model import trained_like
 from support.bundles.skinned_person import CASTERS, FPS, FRAMES, capsule_person, unseen_pose
 
@@ -43,7 +44,7 @@ def person():
     """A trained body of 400 Gaussians, of which some are invisible."""
     model = trained_like(capsule_person(400))
     model.gaussians["opacity_logits"][:7] = -9.0
-    about = {"kind": "computed", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
+    about = origin("computed")
     windows = (Window(0, FRAMES - 1),)
     return TrainedBody([model], windows, FPS, "skinned", {"capture": about})
 
@@ -120,7 +121,8 @@ def test_the_command_writes_what_the_page_plays(person, tmp_path, capsys):
     save_window(tmp_path / "window.safetensors", person.models[0])
     person.save(tmp_path, ["window.safetensors"])
     out, strip = tmp_path / "a.ico3d", tmp_path / "strip.png"
-    assert main(["bake", str(tmp_path), str(out), "--strip", str(strip), "--device", "cpu"]) == 0
+    words = ["bake", str(tmp_path), str(out), "--strip", str(strip), "--device", "cpu", *MADE]
+    assert main(words) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "393 Gaussians on 10 joints, 8 shapes, 31 poses of 9 joints" in said
     bundle = Bundle.open(out)

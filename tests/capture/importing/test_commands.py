@@ -117,7 +117,7 @@ def test_a_still_scene_of_nerfstudio(tmp_path):
     foreign_models.write_transforms(
         tmp_path, entries, camera_model="OPENCV", k1=-0.05, k2=0.01, p1=1e-3
     )
-    capture = imported(tmp_path, tmp_path / "out", consent="given", licence="CC0")
+    capture = imported(tmp_path, tmp_path / "out", likeness="Ada", consent="given", licence="CC0")
     assert [lens.name for lens in capture.lenses][:2] == ["frame_00000", "frame_00001"]
     assert [lens.intrinsics[0, 0] for lens in capture.lenses][:3] == [55, 60, 55]
     assert capture.lenses[4].distortion == (-0.05, 0.01, 1e-3, 0, 0)
@@ -127,7 +127,13 @@ def test_a_still_scene_of_nerfstudio(tmp_path):
         np.testing.assert_allclose(found[:3, 3], Y_UP @ pose[:3, 3], atol=1e-9)
         recorded = capture.files.picture(index, 0)
         np.testing.assert_array_equal(recorded, foreign_models.picture(index))
-    assert capture.provenance["consent"] == "given" and capture.provenance["licence"] == "CC0"
+    assert capture.provenance == {
+        "kind": "multiview",
+        "sources": [f"transforms.json: {tmp_path.name}"],
+        "likeness": "Ada",
+        "consent": "given",
+        "licence": "CC0",
+    }
 
 
 def test_the_axis_nearly_up_is_meant_to_be_up(tmp_path):

@@ -78,10 +78,13 @@ def test_existing_folder_is_left_alone(tmp_path, capfd):
     assert "exists already" in capfd.readouterr().err
 
 
+AGREED = ("--likeness", "Ada", "--consent", "tests")
+
+
 @needs_clip
 def test_frames_without_a_face_and_without_sound(tmp_path, capfd):
     video = _shortened(tmp_path / "v.mp4", 22, blank=range(11, 14))
-    assert _capture(video, tmp_path / "out", "--consent", "tests", "--intrinsics", "600") == 0
+    assert _capture(video, tmp_path / "out", *AGREED, "--intrinsics", "600") == 0
     said = " ".join(capfd.readouterr().err.split())
     assert "3 of 22 frames show no face and are left out (frames 11, 12, 13)" in said
     assert "no sound" in said
@@ -91,7 +94,7 @@ def test_frames_without_a_face_and_without_sound(tmp_path, capfd):
     assert len(capture.split.train) == 17 and capture.split.test == (20, 21)
     assert capture.cameras[0].intrinsics[0, 0] == 600.0
     assert np.isfinite(capture.blendshapes(12)).all()
-    assert capture.provenance["consent"] == "tests"
+    assert (capture.provenance["likeness"], capture.provenance["consent"]) == ("Ada", "tests")
     details = json.loads((tmp_path / "out" / "ico3d.json").read_text())
     assert details["frames_without_face"] == [11, 12, 13]
     assert details["tracker"]["reprojection_px"] < 2

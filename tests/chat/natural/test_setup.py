@@ -40,7 +40,7 @@ def test_its_settings_choose_what_it_installs():
 def test_without_a_yes_nothing_is_installed(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("sys.stdin", io.StringIO())  # nobody is there to ask
     monkeypatch.setattr(needs, "PACKAGES", (needs.Need("no-such", "a test", 1, "MIT", "1.0"),))
-    assert main(["demo", "--natural", "--no-open"]) == 1
+    assert main(["demo", "--natural", "--no-browser"]) == 1
     told = capsys.readouterr()
     assert "add --yes" in told.err
     for word in ("no-such 1.0", "smollm2-135m", "71 MB", "Apache-2.0", "MIT"):

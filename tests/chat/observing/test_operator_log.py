@@ -3,10 +3,12 @@
 import asyncio
 import contextlib
 import io
+import json
 import logging
 import re
 import subprocess
 import sys
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -17,9 +19,14 @@ from openai import AuthenticationError
 from pipecat.frames.frames import ErrorFrame
 
 from ico3d.chat.observing.failures import ReportedError, cause, cause_of
-from ico3d.chat.observing.operator_log import OperatorLog, StandardHandler, constant_part
+from ico3d.chat.observing.operator_log import (
+    OperatorLog,
+    StandardHandler,
+    constant_part,
+    set_up_log,
+)
 from ico3d.chat.wire.protocol import Answer, Speech, State, Text
-from ico3d.errors import ServiceError
+from ico3d.errors import ServiceError, SettingsError
 from ico3d.measure.talking.page import open_page
 from support.chat.remote import serving
 from support.chat.scripted_server import chunk
@@ -228,3 +235,17 @@ def test_a_cause_is_kinds_and_numbers(error, told):
 def test_a_status_is_found_where_the_exception_is_lost(text, told):
     assert cause_of(ErrorFrame(text)) == told
     assert "secret" not in cause_of(ErrorFrame("my secret of 401 nights"))
+
+
+def test_lines_of_json_say_the_same():
+    file, clock = io.StringIO(), [0.0]
+    log = OperatorLog(file, lambda: clock[0], as_json=True)
+    for clock[0] in (0.0, 1.0, 61.0):
+        log.write("ERROR", 'voice failed: "401"')
+    first, again = [json.loads(line) for line in file.getvalue().splitlines()]
+    when = datetime.fromisoformat(first.pop("time"))
+    assert when.tzinfo is not None
+    assert first == {"level": "ERROR", "message": 'voice failed: "401"', "left_out": 0}
+    assert again["left_out"] == 1
+    with pytest.raises(SettingsError, match="--json-log"):
+        set_up_log(verbose=True, as_json=True)

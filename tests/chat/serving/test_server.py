@@ -39,6 +39,10 @@ pytestmark = pytest.mark.slow
         ("localhost:8765", "http://localhost:8765", True),
         ("localhost:8765", "http://127.0.0.1:8765", True),
         ("[::1]:8765", "http://[::1]:8765", True),
+        ("localhost.:8765", "http://localhost.:8765", True),
+        ("localhost.:8765", "http://localhost:8765", True),
+        ("localhost..:8765", None, False),
+        (".:8765", None, False),
         ("localhost:8765", "http://localhost:3000", False),
         ("localhost:8765", "http://evil.example", False),
         ("localhost:8765", "null", False),
@@ -83,22 +87,22 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
         assert foreign.status_code == 403
 
 
-async def test_figures_are_for_those_who_may_see_the_page(typed):
-    url, _ = typed
+async def test_figures_are_on_a_port_of_their_own(typed):
+    url, sessions = typed
     page, welcome = await open_page(url, microphone=False)
     async with httpx.AsyncClient(base_url=url) as client:
-        figures = await client.get("/metrics")
+        assert (await client.get("/metrics")).status_code == 404
+        figures = await client.get(sessions.monitor.publish("127.0.0.1", 0))
         assert figures.headers["content-type"].startswith("text/plain; version=")
         lines = figures.text.splitlines()
         assert "ico3d_sessions 1.0" in lines and "ico3d_connections 1.0" in lines
+        assert "ico3d_waiting 0.0" in lines
         assert welcome.session not in figures.text
-        for foreign in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
-            assert (await client.get("/metrics", headers=foreign)).status_code == 403
         await page.send_frame("garbage")
         await page.wait(Error)
         await page.close()
         while "ico3d_connections 0.0" not in lines:
-            lines = (await client.get("/metrics")).text.splitlines()
+            lines = (await client.get(str(figures.url))).text.splitlines()
     assert "ico3d_sessions 0.0" in lines  # it left: what only drops comes back
     assert 'ico3d_errors_total{where="protocol"} 1.0' in lines
 

@@ -6,6 +6,7 @@ import torch
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
 from support.avatars.moving_body import FPS, MovingPerson
+from support.avatars.origins import origin
 from support.photograph import photograph
 
 SIZE, NOISE = 96, 0.03
@@ -51,4 +52,4 @@ class FilmedPerson(Capture):
 
     @property
     def provenance(self):
-        return {"kind": "filmed", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
+        return origin("filmed")

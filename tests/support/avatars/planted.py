@@ -11,6 +11,7 @@ from ico3d.common.camera import Camera, look_at
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
+from support.avatars.origins import origin
 from support.heads.shapes import head_shape
 from support.photograph import photograph
 
@@ -79,7 +80,7 @@ class PlantedCapture(Capture):
 
     @property
     def provenance(self):
-        return {"kind": "planted", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
+        return origin("planted")
 
     @staticmethod
     def _smooth(frame, count):

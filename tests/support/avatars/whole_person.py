@@ -17,6 +17,7 @@ from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from support.avatars.filmed_person import FilmedPerson
+from support.avatars.origins import origin
 from support.avatars.planted import PlantedCapture, planted_eyes, planted_model
 
 FPS, WINDOWS = 15.0, (Window(0, 8), Window(8, 14))
@@ -52,7 +53,7 @@ def _head(eyes: EyeRange) -> TrainedHead:
     encoder = load_encoder("builtin")
     torch.manual_seed(0)
     adaptor = SpeechAdaptor(encoder.size).requires_grad_(False)
-    about = {"kind": "planted", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
+    about = origin("planted")
     args = ("speech", (), "builtin", encoder.sha256, adaptor, {"capture": about})
     return TrainedHead(planted_model(39), *args, eyes=eyes)
 
@@ -74,7 +75,7 @@ def _body(folder: Path) -> TrainedBody:
     files = [f"{i}.safetensors" for i in range(len(WINDOWS))]
     for file, model in zip(files, models, strict=True):
         save_window(folder / file, model)
-    about = {"kind": "filmed", "sources": ["a seed"], "consent": "none", "licence": "CC-BY-4.0"}
+    about = origin("filmed", "CC-BY-4.0")
     body = TrainedBody(models, WINDOWS, FPS, "spacetime", {"capture": about})
     body.save(folder, files)
     return body

@@ -1,5 +1,6 @@
 import { loadManifest, THUMBNAIL } from '../bundle/load.ts';
 import { PageError, sentenceOf } from '../errors.ts';
+import { admit, fromSite } from '../admission.ts';
 import { Server } from '../server.ts';
 import type { Emit, TalkEvents } from '../talk/events.ts';
 import { focusOn } from '../ui/elements.ts';
@@ -8,7 +9,6 @@ import { codeOf, english, say, type Sentence } from '../words/text.ts';
 import { Overlay, type Choice } from '../ui/overlay.ts';
 import type { Presence, Visit } from '../visit.ts';
 import { xrSettings } from '../xr/settings.ts';
-import { admit } from './admission.ts';
 import { buildShell, fillPage, type Shell } from './shell.ts';
 
 /** Details of the events of `<ico3d-avatar>`, by name. All bubble, through shadow roots too. */
@@ -164,7 +164,7 @@ export class AvatarElement extends HTMLElement {
     this.server = new Server(address);
     this.server.token = this.getAttribute('token') ?? this.server.token;
     const tokens = this.getAttribute('token-url');
-    if (tokens) await admit(this.server, new URL(tokens, document.baseURI).href, signal);
+    if (tokens) await admit(this.server, fromSite(new URL(tokens, document.baseURI).href), say('error.token'), signal);
     return this.server;
   }
 

@@ -21,6 +21,7 @@ import { groundOf, person, wholeBody } from './camera/subject.ts';
 
 const MOST_PIXELS = 2; // along a side, for one of the page
 const REST = 0.1; // s without a change after which a picture is at rest
+const SPARING = 0.095; // s from picture to picture at least, where the processor that draws is needed elsewhere
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 
 /** Canvas, camera and actors: draws what changed and nothing else, and nothing while nobody can see it. */
@@ -47,6 +48,7 @@ export class Stage {
   private size: readonly [number, number] | null = null; // of pictures, else the canvas's own
   private drew = false; // in the last frame
   private resting = 0; // s since something changed
+  private sparing = false;
   private presentation: Presentation | null = null; // instead of the page
   private readonly evaluation = new Mean(); // ms
   private readonly drawing = new Mean(); // ms
@@ -217,6 +219,15 @@ export class Stage {
     this.dirty = true;
   }
 
+  /**
+   * Leaves the processor to others from now on, or takes it again: while a visitor speaks and waits for
+   * an answer, whoever works it out may be on this very machine. A graphics card is nobody else's.
+   */
+  spare(sparing: boolean): void {
+    if (sparing !== this.sparing) this.quality.rest();
+    this.sparing = sparing;
+  }
+
   /** Draws pictures of a size in pixels, or of the canvas's own again. */
   drawAt(size: readonly [number, number] | null): void {
     this.size = size;
@@ -297,10 +308,11 @@ export class Stage {
    * drawing by far (`docs/benchmarks.md`), and lips are where the sound is.
    */
   private frame(now: number): void {
-    if (this.painter.busy) return;
+    const spares = this.sparing && this.painter.path === 'soft';
     const step = this.lastFrame && now - this.lastFrame;
+    if (this.painter.busy || (spares && step && step < SPARING)) return;
     this.lastFrame = now;
-    if (step && this.drew && this.quality.picture(step)) this.applyQuality();
+    if (step && this.drew && !spares && this.quality.picture(step)) this.applyQuality();
     this.presentation?.frame(step, this.quality.level.pixels);
     this.advance(step);
     if (this.presentation || this.orbit.update(step)) this.dirty = true; // a headset wants each picture

@@ -92,6 +92,19 @@ export class Overlay {
     this.say(sentence, say('reload'), () => this.reload());
   }
 
+  /** Nobody is admitted without a key: the visitor may type one. */
+  askKey(sentence: Sentence, unlock: (key: string) => void): void {
+    this.show(sentence);
+    const form = byId<HTMLFormElement>(this.root, 'unlock');
+    const input = byId<HTMLInputElement>(this.root, 'key');
+    form.hidden = false;
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      unlock(input.value.trim());
+    };
+    input.focus();
+  }
+
   /**
    * A session is over.
    *

@@ -20,15 +20,14 @@ from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_came
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss, Persona, window_file
 from support.avatars.moving_body import FPS, MovingPerson
+from support.avatars.origins import about, origin
 
 BORDERS, SHAPE = (0, 15, 30, 45), Shape(8, (7, 5, 2))
-PROVENANCE = {"kind": "computed", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
 
 
 def write_body(path: Path, count: int) -> None:
     """Three windows of a second, each with its own order and number of Gaussians."""
     person = MovingPerson(count, BORDERS)
-    person.summary = {"capture": PROVENANCE}
     # Some barely seen: neighbours must be alike at the shared frame, but not in size.
     person.orders = [order[: len(order) - 10 * i] for i, order in enumerate(person.orders)]
     person.opacities[np.concatenate([person.orders[0][len(o) :] for o in person.orders])] = 0.02
@@ -39,7 +38,7 @@ def write_body(path: Path, count: int) -> None:
         data = window.to_bytes(window_file(i))
         results.append(WindowResult(window, data, seconds, Loss(None, None, None)))
     parts = body_bundle.parts_of(results, person)
-    body_bundle.write(path, Persona("Swinger", "", ()), parts, person, None, "")
+    body_bundle.write(path, parts, None, about(Persona("Swinger"), origin("computed")))
 
 
 def reference_of(bundle: Bundle, seconds: float) -> dict:

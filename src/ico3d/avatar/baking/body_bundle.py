@@ -23,6 +23,7 @@ from ico3d.avatar.baking.body_cost import (
     window_pair,
 )
 from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, Shape, WindowBaker
+from ico3d.avatar.baking.telling.about import About
 from ico3d.avatar.clip_views import At, recorded_views
 from ico3d.avatar.moving import MovingBody
 from ico3d.bundle.body import BakedWindow
@@ -32,7 +33,6 @@ from ico3d.bundle.manifest import (
     CameraInfo,
     Loss,
     Manifest,
-    Persona,
     WindowInfo,
     window_file,
 )
@@ -190,25 +190,20 @@ def megabits_per_second(results: list[WindowResult]) -> float:
 
 def write(
     out: Path,
-    persona: Persona,
     parts: BodyParts,
-    body: MovingBody,
     capture: Capture | None,
-    notices: str,
+    about: About,
 ) -> Manifest:
-    """Adds thumbnail, camera, background and provenance to a baked body, and writes the bundle.
+    """Adds thumbnail, camera and background to a baked body, and writes the bundle.
 
     Args:
         out: The file to write.
-        persona: Who the avatar is; the bundle takes this name.
         parts: The baked body.
-        body: The exact body, for the provenance of its recording.
-        capture: The body's recording, for camera, background and provenance; None where it is not
-            at hand.
-        notices: Text of LICENSES.txt; no such file where it is empty.
+        capture: The body's recording, for camera and background; None where it is not at hand.
+        about: What else the bundle tells.
 
     Raises:
-        BundleError: If the provenance is incomplete, or the bundle fails a check.
+        BundleError: If the bundle fails a check.
     """
     info = parts.entry
     camera = standing_camera(np.array(info.low), np.array(info.high), capture)
@@ -216,19 +211,18 @@ def write(
     files = dict(parts.files)
     first = parts.baked.window_gaussians(0, 0.0)
     files[THUMBNAIL] = staging.thumbnail(first, camera, background)
-    if notices:
-        files[LICENSES] = notices.encode()
-    about = body.summary.get("capture") or (capture.provenance if capture else {})
+    if about.notices:
+        files[LICENSES] = about.notices.encode()
     manifest = Manifest(
-        name=persona.name,
+        name=about.name,
         head=None,
         **parts.entries,
         speech=None,
         camera=camera,
         background=background,
-        persona=persona,
+        persona=about.persona,
         loss=parts.loss,
-        provenance=staging.provenance(about, "the body's recording"),
+        provenance=about.provenance,
     )
     return write_bundle(out, *coarse_first(manifest, files))
 

@@ -1,22 +1,24 @@
 """The verb `ico3d bake`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import tyro
 
+from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.common.device import DeviceName
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     import torch
 
     from ico3d.avatar.avatar import TrainedAvatar
     from ico3d.avatar.baking.body_bundle import BodyParts, WindowResult
     from ico3d.avatar.baking.body_cost import HeadAt
+    from ico3d.avatar.baking.telling.about import About
     from ico3d.body.model_folder import TrainedBody
     from ico3d.bundle.animation import Animation
     from ico3d.bundle.manifest import Loss, Persona
@@ -52,6 +54,7 @@ class Bake:
         strip: Also write a picture to this file: recorded | exact | baked.
         force: Write the bundle although it breaks a bound, and play motion that looks bad.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
+        statement: What only people can say of the avatar.
     """
 
     model: tyro.conf.Positional[Path]
@@ -66,6 +69,7 @@ class Bake:
     strip: Path | None = None
     force: bool = False
     device: DeviceName = "auto"
+    statement: Annotated[Statement, tyro.conf.arg(name="")] = field(default_factory=Statement)
 
     def run(self) -> None:
         """Bakes, measures, writes and checks the bundle.
@@ -74,7 +78,8 @@ class Bake:
             BundleError: If loss or size break a bound and `force` is not set.
             CaptureError: If a capture does not fit the model.
             ModelError: If the folder holds nothing that can be baked.
-            SettingsError: If the options do not fit the model.
+            SettingsError: If the options do not fit the model, or nobody says whose likeness the
+                avatar is, who agreed and who makes it.
         """
         from rich.console import Console
 
@@ -120,14 +125,13 @@ class Bake:
         from ico3d.avatar import staging
         from ico3d.avatar.baking import head_bundle, head_cost
         from ico3d.avatar.baking.flat import colors, cost
-        from ico3d.avatar.baking.persona import load_persona
         from ico3d.avatar.baking.samples import recorded_samples
         from ico3d.capture.formats import open_capture
         from ico3d.capture.parts.head_of_body import head_in
 
         self._check_rank()
-        persona, notices = load_persona(self.persona), self._notices()
         capture = head_in(open_capture(self.files[0]))
+        about = self._about(self._persona(), {str(capture.path): capture.provenance})
         neutral = staging.background_colour(capture, 0)
         views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
         if head.model.shape.sh_degree:
@@ -142,8 +146,7 @@ class Bake:
             _save_picture(head_cost.strip(result.head, views), self.strip)
         if not self.force:
             head_bundle.check(result)
-        name = self.name or persona.name
-        head_bundle.write(self._out, name, result, samples, head, capture, persona, notices)
+        head_bundle.write(self._out, result, samples, head, capture, about)
 
     def _bake_body(self, body: "TrainedBody", report: Report) -> None:
         from ico3d.avatar.baking import body_bundle
@@ -151,33 +154,35 @@ class Bake:
 
         if self.rank is not None:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
-        persona, notices = self._body_persona(), self._notices()
         capture = self._capture(0)
+        known = body.summary.get("capture") or (capture.provenance if capture else {})
+        about = self._about(self._body_persona(), {"the body's recording": known})
         body = _flat_body(body, capture, report)
         parts, check = _baked(body, capture, None, read_cuts(self.model, body), report)
         if self.strip:
             _save_picture(body_bundle.strip(body, parts.baked, capture), self.strip)
         if not self.force:
             check()
-        body_bundle.write(self._out, persona, parts, body, capture, notices)
+        body_bundle.write(self._out, parts, capture, about)
 
     def _bake_whole(self, avatar: "TrainedAvatar", report: Report) -> None:
         from ico3d.avatar.baking import head_bundle, head_cost, person_bundle
-        from ico3d.avatar.baking.persona import load_persona
         from ico3d.avatar.recorded import read_cuts
 
         self._check_rank()
-        persona, notices = load_persona(self.persona), self._notices()
+        parts = {"the head's recording": avatar.head, "the body's recording": avatar.body}
+        known = {where: part.summary.get("capture", {}) for where, part in parts.items()}
+        about = self._about(self._persona(), known)
         animation = person_bundle.animation_of(self.model, avatar)
         head_capture, body_capture = self._capture(0), self._capture(1)
         avatar = _flat_avatar(avatar, head_capture, body_capture, report)
-        samples, views = person_bundle.head_samples(avatar, head_capture, persona)
+        samples, views = person_bundle.head_samples(avatar, head_capture, about.persona)
         head = head_bundle.bake(avatar.head, views, samples, self.rank, report)
         head_at = person_bundle.head_at(avatar)
         cuts = read_cuts(self.model, avatar.body)
         body, check = _baked(avatar.body, body_capture, head_at, cuts, report)
-        parts = (head.head, body, samples.expressions)
-        result = person_bundle.put_together(avatar, *parts, body_capture)
+        baked = (head.head, body, samples.expressions)
+        result = person_bundle.put_together(avatar, *baked, body_capture)
         report(f"the whole person: {head_cost.in_words(result.loss)}.")
         if self.strip:
             _save_picture(person_bundle.strip(avatar, result.person, body_capture), self.strip)
@@ -187,7 +192,6 @@ class Bake:
             check()
             person_bundle.check(result)
             animation = _played(animation, report)
-        about = (persona, self.name or persona.name, notices)
         person_bundle.write(self._out, avatar, result, animation, body_capture, about)
 
     def _capture(self, index: int) -> "Capture | None":
@@ -202,14 +206,30 @@ class Bake:
         if self.rank is not None and not 1 <= self.rank <= MAX_RANK:
             self._refuse(f"--rank must lie between 1 and {MAX_RANK}, not {self.rank}.")
 
+    def _about(self, persona: "Persona", parts: "Mapping[str, Mapping]") -> "About":
+        """What the bundle tells besides what it shows.
+
+        Args:
+            persona: Who the avatar is.
+            parts: What the recordings state, by what they are called in errors.
+        """
+        from ico3d.avatar.baking.telling.about import About, provenance_of
+
+        provenance = provenance_of(parts, self.statement, self._out)
+        return About(self.name or persona.name, persona, provenance, self._notices())
+
+    def _persona(self) -> "Persona":
+        from ico3d.avatar.baking.persona import load_persona
+
+        return load_persona(self.persona)
+
     def _body_persona(self) -> "Persona":
         """The persona of --persona; by default one with a name only, as bodies do not talk."""
         from dataclasses import replace
 
-        from ico3d.avatar.baking.persona import load_persona
         from ico3d.bundle.manifest import Persona
 
-        persona = load_persona(self.persona) if self.persona else Persona(self._out.stem, "", ())
+        persona = self._persona() if self.persona else Persona(self._out.stem, "", ())
         return replace(persona, name=self.name or persona.name)
 
     def _notices(self) -> str:

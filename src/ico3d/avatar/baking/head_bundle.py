@@ -10,6 +10,7 @@ from ico3d.avatar import staging
 from ico3d.avatar.baking import head_cost
 from ico3d.avatar.baking.samples import Samples
 from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
+from ico3d.avatar.baking.telling.about import About
 from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
@@ -17,7 +18,6 @@ from ico3d.bundle.manifest import (
     HeadInfo,
     Loss,
     Manifest,
-    Persona,
     SpeechInfo,
 )
 from ico3d.capture.capture import Capture
@@ -125,28 +125,24 @@ def check(result: BakedResult) -> None:
 
 def write(
     out: Path,
-    name: str,
     result: BakedResult,
     samples: Samples,
     head: TrainedHead,
     capture: Capture,
-    persona: Persona,
-    notices: str,
+    about: About,
 ) -> Manifest:
     """Adds motion, camera, speech and thumbnail to a baked head, and writes the bundle.
 
     Args:
         out: The file to write.
-        name: The avatar's name.
         result: The baked head and its loss.
         samples: The samples that the head was baked from.
         head: The exact head, for its speech adaptor.
-        capture: The head's recording, for motion, camera, background and provenance.
-        persona: Who the avatar is.
-        notices: Text of LICENSES.txt; no such file where it is empty.
+        capture: The head's recording, for motion, camera and background.
+        about: What else the bundle tells.
 
     Raises:
-        BundleError: If the provenance is incomplete, or the bundle fails a check.
+        BundleError: If the bundle fails a check.
     """
     poses = staging.idle_motion(capture)
     frontal = staging.frontal_camera(capture)
@@ -165,18 +161,18 @@ def write(
     speech = None
     if head.adaptor is not None:
         files[SPEECH], speech = speech_file(head.adaptor, head.encoder)
-    if notices:
-        files[LICENSES] = notices.encode()
+    if about.notices:
+        files[LICENSES] = about.notices.encode()
     manifest = Manifest(
-        name=name,
+        name=about.name,
         head=head_info(baked, head, idle, capture.fps, len(poses)),
         body=None,
         speech=speech,
         camera=camera,
         background=background,
-        persona=persona,
+        persona=about.persona,
         loss=result.loss,
-        provenance=staging.provenance(capture.provenance, str(capture.path)),
+        provenance=about.provenance,
     )
     return write_bundle(out, *coarse_first(manifest, files))
 

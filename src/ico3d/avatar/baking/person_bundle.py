@@ -21,6 +21,7 @@ from ico3d.avatar.baking.samples import (
     samples_around,
     spoken_expressions,
 )
+from ico3d.avatar.baking.telling.about import About
 from ico3d.avatar.moving import MOMENTS
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.body.planning.windows import Window
@@ -213,7 +214,7 @@ def write(
     result: WholeResult,
     animation: Animation,
     capture: Capture | None,
-    about: tuple[Persona, str, str],
+    about: About,
 ) -> Manifest:
     """Adds animation, camera, speech and thumbnail to a baked person, and writes the bundle.
 
@@ -223,14 +224,11 @@ def write(
         result: The baked person.
         animation: The rest loop and actions.
         capture: The body's recording, for camera and background; None where it is not at hand.
-        about: The persona, the avatar's name, and the text of LICENSES.txt (no such file where the
-            text is empty).
+        about: What else the bundle tells.
 
     Raises:
-        BundleError: If the animation belongs to another body, the provenance is incomplete, or the
-            bundle fails a check.
+        BundleError: If the animation belongs to another body, or the bundle fails a check.
     """
-    persona, name, notices = about
     head = avatar.head
     person = replace(result.person, head=head_bundle.driven(result.person.head, head))
     start = person.gaussians(animation.rest.start / avatar.fps, result.idle)
@@ -246,22 +244,19 @@ def write(
     speech = None
     if head.adaptor is not None:
         files[SPEECH], speech = head_bundle.speech_file(head.adaptor, head.encoder)
-    if notices:
-        files[LICENSES] = notices.encode()
+    if about.notices:
+        files[LICENSES] = about.notices.encode()
     poses = len(person.world_from_head)
-    parts = {"the head's recording": head.summary, "the body's recording": avatar.body.summary}
     manifest = Manifest(
-        name=name,
+        name=about.name,
         head=head_bundle.head_info(person.head, head, result.idle, avatar.fps, poses),
         **result.body.entries,
         speech=speech,
         camera=camera,
         background=background,
-        persona=persona,
+        persona=about.persona,
         loss=result.loss,
-        provenance=staging.joint_provenance(
-            [staging.provenance(part.get("capture", {}), where) for where, part in parts.items()]
-        ),
+        provenance=about.provenance,
     )
     return write_bundle(out, *coarse_first(manifest, files))
 

@@ -13,6 +13,7 @@ from ico3d.capture.checking import head
 from ico3d.capture.checking.contact_sheet import contact_sheet
 from ico3d.capture.finding import Finding
 from ico3d.common.files import write_atomic
+from ico3d.common.people.stated import NOT_STATED, is_stated
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
@@ -187,12 +188,13 @@ def _skeleton(capture: Capture) -> Finding:
 
 
 def _provenance(capture: Capture) -> Finding:
-    """Consent and licence must be known before an avatar is given away."""
+    """Whose likeness it is, consent and licence must be known before an avatar is baked."""
     known = capture.provenance
-    blank = [k for k in ("consent", "licence") if known.get(k, "") in ("", "not stated")]
+    asked = ("likeness", "consent", "licence")
+    blank = [name for name in asked if not is_stated(known[name])]
     if blank:
-        return Finding("provenance", "warn", f"{' and '.join(blank)} not stated")
-    return Finding("provenance", "ok", f"{known['consent']}; {known['licence']}")
+        return Finding("provenance", "warn", f"{' and '.join(blank)} {NOT_STATED}")
+    return Finding("provenance", "ok", "; ".join(known[name] for name in asked))
 
 
 def report(capture: Capture, sheet: Path) -> None:

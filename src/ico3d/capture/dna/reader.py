@@ -151,6 +151,7 @@ class DnaRendering(SmcCapture):
         return {
             "kind": self.kind,
             "sources": [f"DNA-Rendering (ICCV 2023), recording {self.path.stem}"],
+            "likeness": f"the person of DNA-Rendering {self.path.stem}",
             "consent": "given to the makers of DNA-Rendering",
             "licence": "DNA-Rendering licence agreement",
         }

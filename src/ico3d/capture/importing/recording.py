@@ -49,7 +49,7 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
     )
     count = max(max(row) for row in frames) + 1
     sources = (f"{foreign.tool}: {source.resolve().name}",)
-    told = (settings.consent, settings.licence, settings.shows)
+    told = (settings.consent, settings.licence, settings.shows, settings.likeness)
     about = Description(settings.fps, count, places, sources, *told)
     with new_folder(out) as work:
         _copy(work, places, cameras, frames)

@@ -46,6 +46,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
         known["consent"],
         known["licence"],
         capture.shows,
+        known["likeness"],
     )
     cameras = range(len(capture.cameras))
     with new_folder(out) as work:

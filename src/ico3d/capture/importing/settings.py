@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Literal
 
+from ico3d.common.people.stated import NOT_STATED
 from ico3d.errors import SettingsError
 
 
@@ -16,7 +17,9 @@ class ImportSettings:
         images: Folder of a COLMAP model's pictures; by default a folder `images` nearby.
         fps: Frames per second, for recordings whose pictures have times.
         scale: Metres per unit of the source; COLMAP's unit is arbitrary.
-        consent: What the person agreed to; goes into the avatar's manifest.
+        likeness: Who the person is; goes into the avatar's manifest, and ico3d forget finds by this
+            name what belongs to the person.
+        consent: What the person agreed to, and how; goes into the avatar's manifest.
         licence: Licence of the recording; goes into the avatar's manifest.
         shows: What fills the pictures: the whole body, or the head (for training a head).
     """
@@ -24,8 +27,9 @@ class ImportSettings:
     images: Path | None = None
     fps: float = 25.0
     scale: float = 1.0
-    consent: str = "not stated"
-    licence: str = "not stated"
+    likeness: str = NOT_STATED
+    consent: str = NOT_STATED
+    licence: str = NOT_STATED
     shows: Literal["body", "head"] = "body"
 
     def __post_init__(self):

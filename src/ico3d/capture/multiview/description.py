@@ -11,6 +11,7 @@ import numpy as np
 from ico3d.capture.lens import Lens
 from ico3d.capture.poses import rigid
 from ico3d.common.files import write_atomic
+from ico3d.common.people.stated import NOT_STATED
 from ico3d.errors import CaptureError
 
 NAME = "cameras.json"
@@ -43,18 +44,20 @@ class Description:
         num_frames: Number of frames of every camera.
         places: The cameras.
         sources: Data from which the recording was made.
-        consent: What the person agreed to.
+        consent: What the person agreed to, and how.
         licence: Licence of the recording.
         shows: What fills the pictures: "body", or "head" (with or without shoulders).
+        likeness: Who the person is.
     """
 
     fps: float
     num_frames: int
     places: tuple[Place, ...]
     sources: tuple[str, ...] = ()
-    consent: str = "not stated"
-    licence: str = "not stated"
+    consent: str = NOT_STATED
+    licence: str = NOT_STATED
     shows: str = "body"
+    likeness: str = NOT_STATED
 
     def write(self, folder: Path) -> None:
         """Writes `cameras.json` into a folder."""
@@ -65,6 +68,7 @@ class Description:
             "fps": self.fps,
             "num_frames": self.num_frames,
             "sources": list(self.sources),
+            "likeness": self.likeness,
             "consent": self.consent,
             "licence": self.licence,
             "cameras": [_entry(place) for place in self.places],
@@ -101,9 +105,10 @@ def read_description(folder: Path) -> Description:
         int(number(content, "num_frames", f"{file}", 1, MOST_FRAMES)),
         places,
         tuple(map(str, sources)) if isinstance(sources, list) else (),
-        str(content.get("consent", "not stated")),
-        str(content.get("licence", "not stated")),
+        str(content.get("consent", NOT_STATED)),
+        str(content.get("licence", NOT_STATED)),
         shows,
+        str(content.get("likeness", NOT_STATED)),
     )
 
 

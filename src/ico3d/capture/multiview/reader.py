@@ -152,10 +152,11 @@ class MultiviewCapture(RecordedCapture):
 
     @property
     def provenance(self) -> dict:
-        """Sources, consent and licence from `cameras.json`."""
+        """Sources, likeness, consent and licence from `cameras.json`."""
         return {
             "kind": self.kind,
             "sources": list(self._about.sources),
+            "likeness": self._about.likeness,
             "consent": self._about.consent,
             "licence": self._about.licence,
         }

@@ -153,10 +153,10 @@ class TalkingPortrait(RecordedCapture):
 
     @property
     def provenance(self) -> dict:
-        """Consent, licence and sources, as far as the folder states them."""
-        unknown = {"sources": [self.path.name], "consent": "not stated", "licence": "not stated"}
+        """Likeness, consent, licence and sources, as far as the folder states them."""
+        unknown = super().provenance | {"sources": [self.path.name]}
         stated = self._details.get("provenance")
-        return {"kind": self.kind, **unknown, **(stated if isinstance(stated, dict) else {})}
+        return unknown | (stated if isinstance(stated, dict) else {})
 
     @property
     def details(self) -> dict:

@@ -173,6 +173,7 @@ class RenderMe360(SmcCapture):
         return {
             "kind": self.kind,
             "sources": [f"RenderMe-360 (NeurIPS 2023), recording {self._name}"],
+            "likeness": f"the person of RenderMe-360 {self._name}",
             "consent": "given to the makers of RenderMe-360",
             "licence": "RenderMe-360 licence agreement",
         }

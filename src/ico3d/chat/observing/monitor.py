@@ -13,20 +13,19 @@ from typing import TextIO
 
 from loguru import logger
 from prometheus_client import (
-    CONTENT_TYPE_LATEST,
     CollectorRegistry,
     Counter,
     Gauge,
     Histogram,
     ProcessCollector,
     generate_latest,
+    start_http_server,
 )
 
 from ico3d.chat.observing.timing import Turn
 from ico3d.errors import SettingsError
 
 BUCKETS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.3, 2.0, 3.0, 5.0, 10.0)
-CONTENT_TYPE = CONTENT_TYPE_LATEST
 
 
 class TurnLog:
@@ -90,6 +89,7 @@ class Monitor:
         )
         self._sessions = Gauge("ico3d_sessions", "Open sessions.", registry=registry)
         self.connections = Gauge("ico3d_connections", "Open connections.", registry=registry)
+        self.waiting = Gauge("ico3d_waiting", "Visitors in the queue.", registry=registry)
 
     def visitor(self) -> "Visitor":
         """Counts a new session."""
@@ -145,6 +145,29 @@ class Monitor:
     def exposition(self) -> bytes:
         """All figures in Prometheus' text format."""
         return generate_latest(self._registry)
+
+    def publish(self, host: str, port: int) -> str:
+        """Serves the figures in a thread, on a port of their own that visitors need not reach.
+
+        Args:
+            host: Address to listen on.
+            port: Port to listen on; 0 takes any free port.
+
+        Returns:
+            Their URL.
+
+        Raises:
+            SettingsError: If the port cannot be opened.
+        """
+        try:
+            server, _ = start_http_server(port, host, registry=self._registry)
+        except OSError as error:
+            raise SettingsError(
+                f"port {port} on {host} cannot be used for figures ({error.strerror}): "
+                "choose another one with --metrics-port."
+            ) from error
+        shown = f"[{host}]" if ":" in host else host
+        return f"http://{shown}:{server.server_port}/metrics"
 
 
 class Visitor:

@@ -7,16 +7,18 @@ constant part is shown, as it stands in the source code of the logging call.
 
 import ast
 import functools
+import json
 import linecache
 import logging
 import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, TextIO
 
 from ico3d.chat.observing.failures import cause
-from ico3d.errors import MissingExtraError
+from ico3d.errors import MissingExtraError, SettingsError
 
 if TYPE_CHECKING:
     from loguru import Message
@@ -35,9 +37,21 @@ LOGGING_CALL_LINES = 12  # source lines that one call of a logger takes at most
 class OperatorLog:
     """Writes lines; repetitions are counted instead of written again."""
 
-    def __init__(self, file: TextIO | None = None, now: Callable[[], float] = time.monotonic):
-        """Writes to `file`, by default the current standard error stream; `now` gives seconds."""
+    def __init__(
+        self,
+        file: TextIO | None = None,
+        now: Callable[[], float] = time.monotonic,
+        as_json: bool = False,
+    ):
+        """Starts without lines.
+
+        Args:
+            file: Where to write, by default to the current standard error stream.
+            now: Returns the time in seconds.
+            as_json: Whether a line is an object of JSON.
+        """
         self._file, self._now = file, now
+        self._form = as_object if as_json else as_text
         self._seen: dict[str, tuple[float, int]] = {}  # when a line was written, how often since
 
     def write(self, level: str, line: str) -> None:
@@ -50,10 +64,8 @@ class OperatorLog:
         self._seen[line] = now, 0
         while len(self._seen) > MOST:
             del self._seen[next(iter(self._seen))]
-        again = f" ({more} more of these since)" if more else ""
-        when = time.strftime("%H:%M:%S")
         with suppress(OSError):  # a full disk loses lines, not conversations
-            print(f"{when} {level}: {line}{again}", file=self._file or sys.stderr, flush=True)
+            print(self._form(level, line, more), file=self._file or sys.stderr, flush=True)
 
     def take(self, message: "Message") -> None:
         """Handles a record of loguru, of ico3d or pipecat."""
@@ -68,6 +80,18 @@ class OperatorLog:
                 record["level"].name,
                 _line(f"{name}.{record['function']}", said, exception.value if exception else None),
             )
+
+
+def as_text(level: str, line: str, more: int) -> str:
+    """A line of the log for people; `more` is how often it was left out before."""
+    again = f" ({more} more of these since)" if more else ""
+    return f"{time.strftime('%H:%M:%S')} {level}: {line}{again}"
+
+
+def as_object(level: str, line: str, more: int) -> str:
+    """A line of the log for programs: an object of JSON."""
+    when = datetime.now(UTC).isoformat(timespec="milliseconds")
+    return json.dumps({"time": when, "level": level, "message": line, "left_out": more})
 
 
 class StandardHandler(logging.Handler):
@@ -86,12 +110,19 @@ class StandardHandler(logging.Handler):
         self._log.write(record.levelname, _line(record.name, said, error))
 
 
-def set_up_log(verbose: bool) -> None:
+def set_up_log(verbose: bool, as_json: bool = False) -> None:
     """Shows warnings and errors on the standard error stream; if verbose, everything said, too.
+
+    Args:
+        verbose: Whether to show everything, in the libraries' own form.
+        as_json: Whether a line is an object of JSON.
 
     Raises:
         MissingExtraError: If the extra `chat` is not installed.
+        SettingsError: If both are asked for.
     """
+    if verbose and as_json:
+        raise SettingsError("--verbose has a form of its own: leave --json-log out.")
     try:
         from loguru import logger
     except ImportError:
@@ -101,7 +132,7 @@ def set_up_log(verbose: bool) -> None:
         logger.add(sys.stderr, level="DEBUG")
         logging.basicConfig(level=logging.INFO)
         return
-    log = OperatorLog()
+    log = OperatorLog(as_json=as_json)
     logger.add(log.take, level="WARNING", format="{message}")
     logging.getLogger().addHandler(StandardHandler(log))
 

@@ -13,6 +13,7 @@ from ico3d.chat.remote.door import Door, error_response
 from ico3d.chat.remote.headless import Spares
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.serving.guard import Guard
+from ico3d.chat.serving.network.reach import own_names
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel
 
@@ -39,7 +40,7 @@ def make_service_app(
     """
     app = _bare_app(kind, name)
     KINDS[kind].add_routes(app, name, Spares(make), limits.seconds)
-    return Guard(Door(app, limits, key), host)
+    return Guard(Door(app, limits, key), host, names=own_names(host))
 
 
 def make_expression_app(
@@ -56,7 +57,7 @@ def make_expression_app(
     """
     app = _bare_app("expression", sha256)
     expression.add_routes(app, model, sha256)
-    return Guard(Door(app, limits, key), host)
+    return Guard(Door(app, limits, key), host, names=own_names(host))
 
 
 def _bare_app(kind: str, name: str) -> FastAPI:

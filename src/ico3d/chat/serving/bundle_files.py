@@ -58,11 +58,11 @@ class BundleFiles:
         return Response(data, media_type=media_type, headers=headers)
 
     def _content(self, name: str) -> bytes:
-        """A file as the page gets it: a persona file shows its name, its notes are not sent."""
-        own = self._bundle.manifest.persona
-        if name != MANIFEST or self._persona is None or self._persona is own:
+        """A file as the page gets it: what a persona knows and how it behaves is not sent."""
+        if name != MANIFEST:
             return self._bundle.read(name)
-        shown = Persona(self._persona.name, self._persona.greeting)
+        persona = self._persona or self._bundle.manifest.persona
+        shown = Persona(persona.name, persona.greeting, languages=persona.languages)
         return replace(self._bundle.manifest, persona=shown).to_json()
 
     def _compress(self, name: str) -> bytes | None:

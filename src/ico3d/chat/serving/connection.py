@@ -11,12 +11,21 @@ from ico3d.chat.observing.failures import cause
 from ico3d.chat.page import Outbox
 from ico3d.chat.serving.crowd import machine_of
 from ico3d.chat.serving.limits import ConnectionLimits, Inlet
-from ico3d.chat.serving.sessions import Session, Sessions
-from ico3d.chat.serving.waiting import FullError, Ticket
+from ico3d.chat.serving.sessions import HastyError, Session, Sessions
+from ico3d.chat.serving.waiting import ClosedError, FullError, Ticket
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
 from ico3d.chat.wire.protocol import Ack, Error, Hello, Notice, Welcome
-from ico3d.chat.wire.sentences import ELSEWHERE, FAULT, FULL, OUTDATED, UNREADY, Sentence
+from ico3d.chat.wire.sentences import (
+    CROWDED,
+    ELSEWHERE,
+    ENDING,
+    FAULT,
+    FULL,
+    OUTDATED,
+    UNREADY,
+    Sentence,
+)
 from ico3d.errors import Ico3dError, ProtocolError
 
 HELLO_SECONDS = 10  # that a page may take to say hello
@@ -102,6 +111,11 @@ class Connection:
         except FullError as error:
             self._sessions.monitor.failed("full")
             raise Hangup(BUSY, FULL, again=True) from error
+        except HastyError as error:
+            self._sessions.monitor.failed("hasty")
+            raise Hangup(BUSY, CROWDED, again=True) from error
+        except ClosedError as error:
+            raise Hangup(BUSY, ENDING, again=True) from error
         if ticket is None:
             return None
         try:
@@ -126,6 +140,8 @@ class Connection:
                 moved.cancel()
                 if ticket.replaced:
                     raise Hangup(GOING, ELSEWHERE, again=True)
+                if ticket.turned_away:
+                    raise Hangup(BUSY, ENDING, again=True)
                 if spoken.done():
                     spoken.result()
                     raise Hangup(BROKEN, "a page that waits for its turn sends nothing.")

@@ -3,10 +3,13 @@
 import contextlib
 import ipaddress
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+
+from ico3d.chat.supervision.allowance import Bucket
 
 MOST_SOCKETS = 64
 """Open WebSockets of one machine; a classroom or an office may share its address."""
+REMEMBERED = 4096  # machines whose use is counted
 OWN_NETWORK = 64  # bits of an IPv6 address that tell one household from another
 
 
@@ -35,6 +38,37 @@ class Crowd:
             self._open[machine] -= 1
             if not self._open[machine]:
                 del self._open[machine]
+
+
+class Meters:
+    """A bucket for each machine, for what it may do only so often."""
+
+    def __init__(self, rate: float, burst: float, now: Callable[[], float]):
+        """Starts with full buckets.
+
+        Args:
+            rate: What a machine may do per second for long.
+            burst: What it may do at once.
+            now: Returns the time in seconds.
+        """
+        self._make = lambda: Bucket(rate, burst, now)
+        self._buckets: dict[str, Bucket] = {}  # the one used last is the last
+
+    def of(self, machine: str) -> tuple[Bucket, ...]:
+        """The bucket of a machine; none for what `machine_of` does not know."""
+        if not machine:
+            return ()
+        bucket = self._buckets.pop(machine, None) or self._make()
+        self._buckets[machine] = bucket
+        if len(self._buckets) > REMEMBERED:
+            full = [name for name, bucket in self._buckets.items() if bucket.is_full]
+            for name in full[:-1] or list(self._buckets)[:1]:
+                del self._buckets[name]
+        return (bucket,)
+
+    def take(self, machine: str) -> bool:
+        """Counts one act of a machine; returns whether it is allowed."""
+        return all(bucket.take(1) for bucket in self.of(machine))
 
 
 def machine_of(client: tuple[str, int] | None) -> str:

@@ -142,21 +142,25 @@ def is_own_name(name: str, bound: str) -> bool:
     """
     if name in LOOPBACK or name == bound.casefold():
         return True
-    return bound not in LOOPBACK and _is_number(name)
+    return bound not in LOOPBACK and is_number(name)
 
 
 def split_host(value: str | None) -> tuple[str | None, int | None]:
-    """Name and port of `name:port`; (None, None) for a malformed value."""
+    """Name and port of `name:port`, without the dot that may end a name.
+
+    Both are None for a malformed value.
+    """
     try:
         parts = urlsplit(f"//{value}")
         if not value or parts.username is not None or parts.path or parts.query or parts.fragment:
             return None, None
-        return parts.hostname, parts.port
+        return (parts.hostname or "").removesuffix(".") or None, parts.port
     except ValueError:
         return None, None
 
 
-def _is_number(name: str) -> bool:
+def is_number(name: str) -> bool:
+    """Whether a name is an IP address."""
     try:
         ipaddress.ip_address(name)
     except ValueError:

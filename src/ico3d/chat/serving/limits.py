@@ -4,6 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import (
     MAX_BURST,
     MAX_RATE,
@@ -28,25 +29,6 @@ CATCH_UP = 2.0  # times real time at which sound may arrive and still be used
 JITTER, BACKLOG = 1.0, 0.1  # s of sound that may come at once, and that may after a pause
 SETTLED = 0.2  # s of sound: how far the balance falls at most, so how soon a backlog is over
 KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and how it began
-
-
-class Bucket:
-    """A token bucket: `rate` per second on average, `burst` at once."""
-
-    def __init__(self, rate: float, burst: float, now: Callable[[], float]):
-        """Starts full."""
-        self._rate, self._burst, self._now = rate, burst, now
-        self._level, self._at = burst, now()
-
-    def take(self, amount: float) -> bool:
-        """Takes an amount if the bucket has it; returns whether it has."""
-        now = self._now()
-        self._level = min(self._burst, self._level + self._rate * (now - self._at))
-        self._at = now
-        if amount > self._level:
-            return False
-        self._level -= amount
-        return True
 
 
 class ConnectionLimits:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import gc
 import socket
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator, Collection, Sequence
 from pathlib import Path
 
 import uvicorn
@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.persona import Persona
-from ico3d.chat.observing.monitor import CONTENT_TYPE
 from ico3d.chat.parts import Avatar
 from ico3d.chat.performing.face import open_face
 from ico3d.chat.services import choose
@@ -24,7 +23,9 @@ from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.network.certificates import Certificate
+from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
 from ico3d.chat.serving.page_files import PageFiles
+from ico3d.chat.serving.running.ending import PatientServer
 from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.chat.settings.conversation import ChatSettings
@@ -95,6 +96,11 @@ def make_app(
     async def health() -> JSONResponse:
         return JSONResponse({"ok": True})
 
+    @app.get("/ready")
+    async def ready() -> JSONResponse:
+        takes = sessions is None or not sessions.line.is_closed
+        return JSONResponse({"ready": takes}, 200 if takes else 503)
+
     files = BundleFiles(bundle, avatar.persona if avatar else None)
 
     @app.get("/bundle/{name:path}")
@@ -110,17 +116,13 @@ def make_app(
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
-    """Adds the WebSocket of conversations and the route of their metrics."""
+    """Adds the WebSocket of conversations."""
     notices = [] if avatar.speech else [STILL_LIPS.notice()]
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:
         await socket.accept()
         await Connection(socket, sessions, notices).run()
-
-    @app.get("/metrics")
-    async def metrics() -> Response:
-        return Response(sessions.monitor.exposition(), headers={"Content-Type": CONTENT_TYPE})
 
 
 def add_page(app: FastAPI) -> None:
@@ -162,15 +164,23 @@ def address(listener: socket.socket, scheme: str = "http") -> str:
     return f"{scheme}://{shown}:{port}/"
 
 
-def make_server(app: Guard, certificate: Certificate | None = None) -> uvicorn.Server:
+def make_server(
+    app: Guard,
+    certificate: Certificate | None = None,
+    proxies: Sequence[str] = (),
+    sessions: Sessions | None = None,
+) -> uvicorn.Server:
     """A server for `app`, by HTTPS if there is a certificate.
 
-    Run it with `server.run(sockets=[listener])`.
+    Run it with `server.run(sockets=[listener])`. On SIGTERM the answers of `sessions` are finished
+    first. `proxies` are the addresses and networks that are believed where a visitor comes from
+    (X-Forwarded-For); nobody else is.
 
     From then on numpy multiplies matrices in one thread. The server's matrices are small, and
     further threads would busily wait on cores that conversations need.
     """
     threadpool_limits(1, user_api="blas")
+    allow_many_connections()
     config = uvicorn.Config(
         app,
         log_config=None,  # `operator_log` takes what it says
@@ -179,7 +189,10 @@ def make_server(app: Guard, certificate: Certificate | None = None) -> uvicorn.S
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,
         server_header=False,
+        http=PromptProtocol,
+        proxy_headers=bool(proxies),
+        forwarded_allow_ips=list(proxies),
         ssl_certfile=certificate.file if certificate else None,
         ssl_keyfile=certificate.key if certificate else None,
     )
-    return uvicorn.Server(config)
+    return PatientServer(config, sessions)

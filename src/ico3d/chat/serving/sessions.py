@@ -10,30 +10,53 @@ from ico3d.chat.observing.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
 from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.services.offers import wished
+from ico3d.chat.serving.crowd import Meters
 from ico3d.chat.serving.freeing import give_back
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
+from ico3d.chat.supervision.allowance import Allowance, Bucket
 from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
-from ico3d.chat.wire.sentences import FAULT, IDLE
+from ico3d.chat.wire.sentences import ENDING, FAULT, IDLE, LONG
 from ico3d.errors import ServiceError
 
+STARTS, STARTS_AT_ONCE = 0.1, 5  # a second for long and at once, per place that a machine may have
 STARTING = 30.0  # s that a conversation may take to start: a model may be loaded, a server asked
+
+
+class HastyError(Exception):
+    """A machine has begun more conversations than it may in a short time."""
 
 
 class Session:
     """One visitor: a page and a conversation, separate from all others."""
 
     def __init__(
-        self, id: str, avatar: Avatar, visitor: Visitor, ended: Callable[["Session"], None]
+        self,
+        ticket: Ticket,
+        avatar: Avatar,
+        visitor: Visitor,
+        ended: Callable[["Session"], None],
+        allowance: Allowance,
     ):
-        """Creates a session; `ended` is called if its conversation breaks off."""
-        self.id = id
+        """Creates a session.
+
+        Args:
+            ticket: Claim to the place that the session takes.
+            avatar: What all sessions share.
+            visitor: Counts events for the operator's figures.
+            ended: Called if the conversation breaks off.
+            allowance: How much the visitor may ask.
+        """
+        self.id, self.machine = ticket.id, ticket.machine
         self.began = asyncio.get_running_loop().time()
         self.page = Page()
         seed = secrets.randbits(32)  # no two visitors see the same blinks and gestures
-        self.conversation = Conversation(avatar, self.page, visitor, lambda: ended(self), seed)
+        self.conversation = Conversation(
+            avatar, self.page, visitor, lambda: ended(self), seed, allowance
+        )
         self.parts: Parts | None = None  # once it has started
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
         self.idle_check: asyncio.TimerHandle | None = None
+        self.limit: asyncio.TimerHandle | None = None  # ends it when it has lasted long enough
 
 
 class Sessions:
@@ -63,9 +86,15 @@ class Sessions:
         self.monitor = monitor or Monitor()
         self._open: dict[str, Session] = {}
         self._closing: set[asyncio.Task] = set()
-        self.line = WaitingLine(self._free, kept=resume_seconds)
+        self.line = WaitingLine(self._free, kept=resume_seconds, has_share=self._has_share)
         """Visitors for whom there is no place yet."""
+        self.monitor.waiting.set_function(lambda: len(self.line))
         self._stays = Stays()
+        limits = avatar.settings.limits
+        self._share = share = limits.share(avatar.settings.max_sessions)
+        asked = share * limits.questions_per_minute
+        self._starts = Meters(share * STARTS, share * STARTS_AT_ONCE, _now)
+        self._questions = Meters(asked / 60, asked, _now)
 
     def __len__(self) -> int:
         """Visitors at this moment, those included that may come back."""
@@ -83,9 +112,13 @@ class Sessions:
 
         Raises:
             FullError: If the queue is full; sessions whose page is away count as taken places.
+            HastyError: If the machine has begun too many conversations in a short time.
+            ClosedError: If the server is about to end.
         """
         if self._resumable(hello):
             return None
+        if not self.line.knows(hello.session) and not self._starts.take(machine):
+            raise HastyError
         return self.line.join(hello.session, machine)
 
     def place(self, ticket: Ticket) -> Place:
@@ -134,9 +167,18 @@ class Sessions:
         loop = asyncio.get_running_loop()
         session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session, "left")
 
+    def present(self) -> list[Session]:
+        """All sessions, those included whose page may come back."""
+        return list(self._open.values())
+
+    def dismiss(self, session: Session) -> None:
+        """Ends a session because the server ends, and tells its page."""
+        session.page.end(ENDING.error(fatal=True, again=True))
+        self._close_soon(session, "server")
+
     async def close_all(self) -> None:
         """Ends all sessions."""
-        for session in list(self._open.values()):
+        for session in self.present():
             self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
 
@@ -147,6 +189,16 @@ class Sessions:
     def _free(self) -> int:
         return self._avatar.settings.max_sessions - len(self._open)
 
+    def _has_share(self, machine: str, kept: int) -> bool:
+        """Whether a machine has room for another session besides `kept` places."""
+        held = sum(session.machine == machine for session in self._open.values())
+        return machine == "" or held + kept < self._share
+
+    def _allowance(self, machine: str) -> Allowance:
+        """What a new visitor may ask: nobody gets more by beginning anew."""
+        asked = self._avatar.settings.limits.questions_per_minute
+        return Allowance(Bucket(asked / 60, asked, _now), *self._questions.of(machine))
+
     def _wished(self, hello: Hello) -> Avatar:
         avatar = self._avatar
         voices = avatar.persona.voice
@@ -155,7 +207,8 @@ class Sessions:
 
     async def _begin(self, hello: Hello, outbox: Outbox, ticket: Ticket) -> Session:
         avatar = self._wished(hello)
-        session = Session(ticket.id, avatar, self.monitor.visitor(), self._broke_off)
+        allowance = self._allowance(ticket.machine)
+        session = Session(ticket, avatar, self.monitor.visitor(), self._broke_off, allowance)
         self._open[session.id] = session
         self.line.leave(ticket)  # the session has the place that was kept for the ticket
         session.page.attach(outbox)
@@ -170,6 +223,9 @@ class Sessions:
                 ) from error
             raise
         self._check_idle(session)
+        if minutes := avatar.settings.limits.session_minutes:
+            loop = asyncio.get_running_loop()
+            session.limit = loop.call_later(60 * minutes, self._outlast, session, minutes)
         return session
 
     def _broke_off(self, session: Session) -> None:
@@ -177,6 +233,11 @@ class Sessions:
         self.monitor.failed("pipeline", "it ended by itself, and the conversation with it")
         session.page.end(FAULT.error(fatal=True, again=True))
         self._close_soon(session, "broken")
+
+    def _outlast(self, session: Session, minutes: float) -> None:
+        """Ends a session that has lasted as long as one may."""
+        session.page.end(LONG.error(fatal=True, again=True, minutes=minutes))
+        self._close_soon(session, "long")
 
     def _check_idle(self, session: Session) -> None:
         """Ends a session in which nothing happens; looks again when that may be so."""
@@ -198,8 +259,9 @@ class Sessions:
         self._stays.end(asyncio.get_running_loop().time() - session.began)
         self.line.move_up()
         self._cancel_expiry(session)
-        if session.idle_check is not None:
-            session.idle_check.cancel()
+        for timer in (session.idle_check, session.limit):
+            if timer is not None:
+                timer.cancel()
         task = asyncio.create_task(dismantle(session.conversation))
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)
@@ -209,6 +271,10 @@ class Sessions:
         if session.expiry is not None:
             session.expiry.cancel()
             session.expiry = None
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
 
 
 async def dismantle(conversation: Conversation) -> None:

@@ -1,7 +1,9 @@
 """Other sites that may show the avatar, and the tokens with which pages are admitted."""
 
+import base64
 import hmac
 import os
+import secrets
 import time
 from collections.abc import Callable
 from urllib.parse import parse_qs
@@ -11,6 +13,7 @@ from fastapi.responses import JSONResponse
 from starlette.types import Scope
 
 from ico3d.chat.serving import tokens
+from ico3d.chat.serving.crowd import Meters, machine_of
 from ico3d.chat.settings.embedding import Embedding, check_origin
 from ico3d.errors import SettingsError
 
@@ -19,6 +22,8 @@ EMBEDDED = ("/ws", "/embed.js", "/assets/", "/bundle/")
 PROTECTED = ("/ws", "/bundle/")
 """What needs a token where there is a key."""
 SHORTEST_KEY = 16  # characters
+OWN_KEY = 16  # characters of a key that a server makes itself: 80 bits
+WRONG, WRONG_AT_ONCE = 0.1, 10  # keys of one machine that may be wrong, per second and at once
 TOKEN_ROUTE = "/token"
 
 
@@ -101,14 +106,48 @@ class Sites:
         return bool(self._key) and hmac.compare_digest(given.encode(), self._key.encode())
 
 
-def open_sites(embedding: Embedding) -> Sites:
+def own_key() -> str:
+    """A new key that can be read aloud and typed: groups of four letters and digits."""
+    text = base64.b32encode(secrets.token_bytes(OWN_KEY * 5 // 8)).decode().lower()
+    return "-".join(text[at : at + 4] for at in range(0, OWN_KEY, 4))
+
+
+def shown_key(is_public: bool, is_open: bool, embedding: Embedding) -> str | None:
+    """The key that visitors have to show, as far as the operator has to be told.
+
+    Args:
+        is_public: Whether others than users of this machine can come.
+        is_open: Whether everybody is admitted.
+        embedding: Names the operator's own key, if there is one.
+
+    Returns:
+        A new key; empty for the operator's own; None if none is asked for.
+
+    Raises:
+        SettingsError: If everybody is admitted and a key is asked for.
+    """
+    if embedding.key_variable and is_open:
+        raise SettingsError(
+            "--open admits everybody, but [embedding] asks for the key in "
+            f"{embedding.key_variable}: leave out one of them."
+        )
+    if embedding.key_variable:
+        return ""
+    return own_key() if is_public and not is_open else None
+
+
+def open_sites(embedding: Embedding, default: str = "") -> Sites:
     """The sites of the settings, with the key from the environment.
+
+    Args:
+        embedding: The settings.
+        default: The key where the settings name none; empty for no key.
 
     Raises:
         SettingsError: If the key is missing or short.
     """
     variable = embedding.key_variable
-    key = os.environ.get(variable, "") if variable else ""
+    key = os.environ.get(variable, "") if variable else default
     if variable and len(key) < SHORTEST_KEY:
         raise SettingsError(
             f"[embedding] needs a key of {SHORTEST_KEY} characters or more in the environment as "
@@ -118,12 +157,18 @@ def open_sites(embedding: Embedding) -> Sites:
 
 
 def add_tokens(app: FastAPI, sites: Sites) -> None:
-    """Adds the route that gives tokens to those who have the key: the backends of sites."""
+    """Adds the route that gives tokens to those who have the key: visitors, backends of sites."""
+    wrong = Meters(WRONG, WRONG_AT_ONCE, time.monotonic)
 
     @app.post(TOKEN_ROUTE)
     async def token(request: Request, origin: str = "") -> Response:
         given = request.headers.get("authorization", "").removeprefix("Bearer ").strip()
+        guesses = wrong.of(machine_of(request.scope.get("client")))
+        if not all(bucket.has(1) for bucket in guesses):
+            return JSONResponse({"error": "too many wrong keys: wait a minute."}, 429)
         if not sites.is_key(given):
+            for bucket in guesses:
+                bucket.take(1)
             return JSONResponse({"error": "the key is missing or wrong."}, 401)
         try:
             text, expires = sites.token(origin)

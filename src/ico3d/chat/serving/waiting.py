@@ -16,6 +16,10 @@ class FullError(Exception):
     """The queue is full as well; the sentence is for the page."""
 
 
+class ClosedError(Exception):
+    """The server is about to end, and takes nobody any more."""
+
+
 class Ticket:
     """The claim of one connection to a place in the queue.
 
@@ -23,6 +27,7 @@ class Ticket:
         id: Id by which a page comes back to its place; its session gets the same one.
         admitted: Whether a place is free for this visitor, and kept until the session begins.
         replaced: Whether another connection has claimed the same place.
+        turned_away: Whether there will be no place, because the server is about to end.
         changed: Set when the queue has moved.
         machine: Machine of the visitor; empty if unknown.
     """
@@ -30,7 +35,7 @@ class Ticket:
     def __init__(self, id: str, machine: str = ""):
         """Waits with its page present."""
         self.id, self.machine = id, machine
-        self.admitted = self.replaced = False
+        self.admitted = self.replaced = self.turned_away = False
         self.changed = asyncio.Event()
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
 
@@ -47,6 +52,7 @@ class WaitingLine:
         free: Callable[[], int],
         most: int = MOST_WAITING,
         kept: float = RESUME_SECONDS,
+        has_share: Callable[[str, int], bool] = lambda *_: True,
     ):
         """Starts empty.
 
@@ -54,10 +60,14 @@ class WaitingLine:
             free: Returns how many more sessions the server may open now.
             most: Largest number of waiting visitors.
             kept: Seconds for which a place is kept after the connection was lost.
+            has_share: Whether a machine may have another place besides its sessions and the given
+                number of places kept for it. Those behind its visitors go first until it may.
         """
         self._free, self._most, self._kept = free, most, kept
+        self._has_share = has_share
         self._waiting: dict[str, Ticket] = {}  # in order
         self._admitted: set[Ticket] = set()
+        self.is_closed = False
 
     def __len__(self) -> int:
         """How many are waiting, including those whose connection was lost a moment ago."""
@@ -72,9 +82,12 @@ class WaitingLine:
 
         Raises:
             FullError: If the queue has as many visitors as it may have, at all or of this machine.
+            ClosedError: If the server is about to end.
         """
+        if self.is_closed:
+            raise ClosedError
         before = self._waiting.get(id or "")
-        if before is None and self._spare() == 0 and self._is_full(machine):
+        if before is None and self._is_full(machine) and not self._admits(machine):
             raise FullError
         ticket = Ticket(before.id if before else secrets.token_urlsafe(16), machine)
         self._waiting[ticket.id] = ticket  # an id that is known keeps its position
@@ -84,6 +97,10 @@ class WaitingLine:
             before.changed.set()
         self.move_up()
         return ticket
+
+    def knows(self, id: str | None) -> bool:
+        """Whether the place with this id is taken by somebody who waits."""
+        return id in self._waiting
 
     def leave(self, ticket: Ticket, for_good: bool = True) -> None:
         """Gives a place up, or keeps it a while for a page that may come back.
@@ -104,7 +121,9 @@ class WaitingLine:
 
     def move_up(self) -> None:
         """Admits as many as there is room for, and tells all that the queue has moved."""
-        for ticket in [t for t in self._waiting.values() if t.expiry is None][: self._spare()]:
+        for ticket in [t for t in self._waiting.values() if t.expiry is None]:
+            if not self._admits(ticket.machine):
+                continue
             del self._waiting[ticket.id]
             ticket.admitted = True
             self._admitted.add(ticket)
@@ -112,16 +131,28 @@ class WaitingLine:
         for ticket in self._waiting.values():
             ticket.changed.set()
 
+    def close(self) -> None:
+        """Admits nobody any more, and tells those who wait."""
+        self.is_closed = True
+        for ticket in self._waiting.values():
+            ticket.turned_away = True
+            ticket.changed.set()
+
     def position(self, ticket: Ticket) -> int:
         """Position of a waiting ticket; 1 is the front."""
         return list(self._waiting).index(ticket.id) + 1
+
+    def _admits(self, machine: str) -> bool:
+        """Whether there is a place for a visitor of this machine now."""
+        kept = sum(ticket.machine == machine for ticket in self._admitted)
+        return self._spare() > 0 and self._has_share(machine, kept)
 
     def _is_full(self, machine: str) -> bool:
         same = [ticket for ticket in self._waiting.values() if ticket.machine == machine != ""]
         return len(self._waiting) >= self._most or len(same) >= SHARE * self._most
 
     def _spare(self) -> int:
-        return max(0, self._free() - len(self._admitted))
+        return 0 if self.is_closed else max(0, self._free() - len(self._admitted))
 
     @staticmethod
     def _cancel_expiry(ticket: Ticket) -> None:

@@ -12,6 +12,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from ico3d.chat.settings.embedding import Embedding
 from ico3d.chat.settings.keys import check_key
 from ico3d.chat.settings.tools import Tool, check_tools
+from ico3d.chat.settings.visits import Visits
 from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
 from ico3d.errors import SettingsError
 
@@ -169,6 +170,7 @@ class ChatSettings:
             never.
         gestures: Whether the body gestures during speech; otherwise it stays at rest.
         memory: How much of the conversation is remembered.
+        limits: How much visitors may take.
         embedding: Who may put the avatar into their pages ([more](conversation/embedding.md)).
         tools: Functions over HTTP that the language model may call.
         allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
@@ -185,6 +187,7 @@ class ChatSettings:
     idle_minutes: float = 10.0
     gestures: bool = True
     memory: Memory = Memory()
+    limits: Visits = Visits()
     embedding: Embedding = Embedding()
     tools: tuple[Tool, ...] = ()
     allow: tuple[str, ...] = ()

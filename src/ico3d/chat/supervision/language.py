@@ -25,11 +25,17 @@ class AnswerGuard(FrameProcessor):
 
     The visitor hears an apology instead of silence if the model returns no words, breaks off, or
     exceeds the limits of `patience`, and if the recogniser has failed. Thoughts of a model count as
-    a sign of life and are not passed on. All other frames pass unchanged.
+    a sign of life and are not passed on. An answer that is too long is cut off. All other frames
+    pass unchanged.
     """
 
     def __init__(
-        self, recognition: FrameProcessor, language: FrameProcessor, patience: Patience, tongue: str
+        self,
+        recognition: FrameProcessor,
+        language: FrameProcessor,
+        patience: Patience,
+        tongue: str,
+        longest: int,
     ):
         """Creates the guard of one session.
 
@@ -38,9 +44,11 @@ class AnswerGuard(FrameProcessor):
             language: Language model whose answers are watched.
             patience: Time limits of an answer, of a piece of it, and of thinking.
             tongue: Language code of the apologies.
+            longest: Letters of an answer after which it is cut off.
         """
         super().__init__()
-        self._patience, self._tongue = patience, tongue
+        self._patience, self._tongue, self._longest = patience, tongue, longest
+        self._letters, self._over = 0, False  # of this answer, and whether it was cut off
         self._answering = False  # between the start of an answer and its end
         self._spoken = self._called = self._broken = False  # this answer has words, calls, an error
         self._timer: asyncio.TimerHandle | None = None
@@ -61,9 +69,15 @@ class AnswerGuard(FrameProcessor):
             elif isinstance(frame, LLMThoughtTextFrame):
                 self._think()
                 return
+            elif isinstance(frame, LLMTextFrame) and self._over:
+                return  # it was on its way when the answer was cut off
             elif isinstance(frame, LLMTextFrame) and frame.text.strip():
                 self._spoken = True
                 self._start_timer()
+                self._letters += len(frame.text)
+                if self._letters > self._longest:
+                    await self._cut(frame)
+                    return
             elif isinstance(frame, FunctionCallsStartedFrame):
                 self._called = True
                 self._stop_timer()
@@ -80,6 +94,7 @@ class AnswerGuard(FrameProcessor):
     def _begin(self) -> None:
         self._answering = True
         self._spoken = self._called = self._broken = False
+        self._letters, self._over = 0, False
         self._start_timer()
 
     async def _end(self, frame: LLMFullResponseEndFrame) -> None:
@@ -117,6 +132,16 @@ class AnswerGuard(FrameProcessor):
             return
         self._answering = False
         await self._apologise("language")
+        await self.push_frame(LLMFullResponseEndFrame())
+
+    async def _cut(self, frame: LLMTextFrame) -> None:
+        """Ends an answer amid the piece that makes it too long."""
+        left = len(frame.text) - (self._letters - self._longest)
+        logger.warning(f"language gave more than {self._longest} letters; the answer was cut off")
+        self._stop_timer()
+        self._answering, self._over = False, True
+        await self.push_frame(InterruptionFrame(), FrameDirection.UPSTREAM)
+        await self.push_frame(LLMTextFrame(frame.text[:left] + "…"))
         await self.push_frame(LLMFullResponseEndFrame())
 
     async def _say(self, failed: Failed) -> None:

@@ -49,6 +49,20 @@ STILL_LIPS = Sentence(
     "still-lips",
     "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks.",
 )
+ENDING = Sentence("ending", "This server is about to restart: try again in a moment.")
 VOICELESS = Sentence("voiceless", "The avatar has lost its voice; its captions go on.")
+LONG = Sentence(
+    "long", "This conversation has lasted {minutes} min, as long as this server allows."
+)
+HASTY = Sentence(
+    "hasty", "so many questions are not answered in so short a time: wait a little, then ask again."
+)
+CROWDED = Sentence(
+    "crowded",
+    "too many conversations were begun from this address: try again in a minute.",
+)
 
-SENTENCES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, VOICELESS)
+
+LIMITS = (LONG, HASTY, CROWDED)
+STATES = (IDLE, FAULT, FULL, UNREADY, ELSEWHERE, OUTDATED, STILL_LIPS, ENDING, VOICELESS)
+SENTENCES = (*STATES, *LIMITS)

@@ -86,16 +86,18 @@ def main(bundle: str, script: str, turns: str, sessions: str) -> None:
     from ico3d.bundle.format import Bundle
     from ico3d.chat.observing.operator_log import set_up_log
     from ico3d.chat.serving import server
+    from ico3d.chat.serving.sessions import Sessions
 
     set_up_log(verbose=False)
     opened = Bundle.open(Path(bundle))
     settings = ChatSettings(turns=Turns(**json.loads(turns)), max_sessions=int(sessions))
     avatar = server.open_avatar(opened, settings)
     avatar = dataclasses.replace(avatar, services=Script(**json.loads(script)).services())
+    sessions = Sessions(avatar)
     listener = server.bind("127.0.0.1", 0)
-    app = server.make_app(opened, avatar, "127.0.0.1")
+    app = server.make_app(opened, avatar, "127.0.0.1", sessions)
     print(server.address(listener), flush=True)
-    server.make_server(app).run(sockets=[listener])
+    server.make_server(app, sessions=sessions).run(sockets=[listener])
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ def test_the_addresses_of_this_machine_are_addresses():
 
 @pytest.mark.usefixtures("interfaces")
 def test_a_phone_is_told_an_address_that_the_certificate_and_the_server_accept(tmp_path):
-    found = find_reach("0.0.0.0", ["Avatar.example.org."], True, None, None, tmp_path)
+    found = find_reach("0.0.0.0", ["Avatar.example.org."], True, None, None, folder=tmp_path)
     assert found.urls(8765) == [
         "https://avatar.example.org:8765/",
         "https://192.168.1.20:8765/",
@@ -64,30 +64,45 @@ def test_a_phone_is_told_an_address_that_the_certificate_and_the_server_accept(t
         assert is_own(host, url.rstrip("/"), "0.0.0.0", found.answered)
     assert not is_own("evil.example:8765", None, "0.0.0.0", found.answered)
     assert not is_own("box:8765", "https://evil.example:8765", "0.0.0.0", found.answered)
-    told = "\n".join(found.told(8765))
-    assert "no password" in told and found.certificate.fingerprint in told
-    assert all(url in told for url in found.urls(8765))
-    assert "\n".join(qr_code("https://avatar.example.org:8765/")) in told
+    told = "\n".join(found.told(8765, "abcd-efgh"))
+    assert "who has the key can talk" in told and found.certificate.fingerprint in told
+    assert all(f"{url}#key=abcd-efgh" in told for url in found.urls(8765))
+    assert "\n".join(qr_code("https://avatar.example.org:8765/#key=abcd-efgh")) in told
 
 
 @pytest.mark.usefixtures("interfaces")
 def test_the_operator_is_told_who_can_reach_the_server():
-    (alone,) = find_reach("127.0.0.1", [], False, None, None).told(8765)
-    assert alone.startswith("Only this machine reaches it")
-    tunnel = find_reach("127.0.0.1", ["avatar.example.org"], False, None, None)
-    assert "tunnel lets through as avatar.example.org" in " ".join(tunnel.told(8765))
-    assert "who has a token can talk" in " ".join(tunnel.told(8765, asks_for_tokens=True))
-    assert tunnel.answered == ("avatar.example.org",) and tunnel.urls(8765) == []
-    open_ = " ".join(find_reach("0.0.0.0", [], False, None, None).told(8765))
-    assert (
-        "everybody can talk: no password" in open_
-        and "can only type" in open_
-        and "fingerprint" not in open_
-    )
+    def told(host, names=(), key=None, **options):
+        return " ".join(find_reach(host, names, False, None, None, **options).told(8765, key))
+
+    alone = told("127.0.0.1")
+    assert alone.startswith("Only this machine reaches it; --host") and "--proxy" not in alone
+    assert told("127.0.0.1", key="").startswith("Only this machine reaches it; who has the key")
+    tunnel = told("127.0.0.1", ["avatar.example.org"], "abcd-efgh")
+    assert "tunnel lets through as avatar.example.org; who has the key can talk" in tunnel
+    assert "the key is abcd-efgh" in tunnel and "limits per address do not hold" in tunnel
+    proxied = told("127.0.0.1", ["avatar.example.org"], "", proxies=["127.0.0.1"])
+    assert "the key is" not in proxied and "limits" not in proxied
+    everybody = told("0.0.0.0", is_open=True)
+    assert "everybody can talk: no key is asked for" in everybody
+    assert "can only type" in everybody and "fingerprint" not in everybody
+    behind = told("0.0.0.0", key="", proxies=["172.18.0.0/16"])
+    assert "who has the key can talk" in behind and "can only type" not in behind
+
+
+def test_a_key_does_not_travel_unencrypted():
+    with pytest.raises(SettingsError, match=r"--tls, or --proxy ADDRESS .* or --open"):
+        find_reach("0.0.0.0", [], False, None, None)
+
+
+@pytest.mark.parametrize("proxy", ["proxy.example", "*", "", "0.0.0.0/0", "::/0", "10.0.0.1/8"])
+def test_not_everybody_is_believed_where_he_comes_from(proxy):
+    with pytest.raises(SettingsError, match="--proxy"):
+        find_reach("127.0.0.1", [], False, None, None, proxies=[proxy])
 
 
 def test_a_given_certificate_brings_its_names_and_no_question(tmp_path):
-    own = find_reach("127.0.0.1", ["avatar.example.org"], True, None, None, tmp_path)
+    own = find_reach("127.0.0.1", ["avatar.example.org"], True, None, None, folder=tmp_path)
     assert own.certificate is not None
     file = own.certificate.file
     given = find_reach("127.0.0.1", [], False, file, file)

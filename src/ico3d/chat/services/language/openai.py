@@ -91,8 +91,8 @@ def hindrance(settings: Settings) -> str:
 
 
 def detail(settings: Settings) -> str:
-    """The model, as shown to visitors, if the settings name one."""
-    return settings.model or settings.url or OWN_MODEL
+    """The model, as shown to visitors, if the settings name one; they are told no address."""
+    return settings.model or ("" if settings.url else OWN_MODEL)
 
 
 def model(settings: Settings) -> str:

@@ -1,14 +1,16 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
-import { admit } from '../../src/embed/admission.ts';
-import { Server } from '../../src/server.ts';
-import { Speaking } from '../../src/talk/events.ts';
+import { admit, byKey, fromSite } from '../src/admission.ts';
+import { Server } from '../src/server.ts';
+import { Speaking } from '../src/talk/events.ts';
+import { say } from '../src/words/text.ts';
 
 const NOW = 1_000_000; // s
 
 describe('a token', () => {
   let given: string[];
-  const ending = new AbortController();
+  let ending: AbortController;
   beforeEach(() => {
+    ending = new AbortController();
     vi.useFakeTimers({ now: 1000 * NOW });
     vi.stubGlobal('fetch', async () => new Response(given.shift(), { status: 200 }));
   });
@@ -27,11 +29,11 @@ describe('a token', () => {
   test('is replaced before it expires, as text or JSON, until the talk ends', async () => {
     const server = new Server(new URL('https://avatar.example/'));
     given = [`${NOW + 600}.x.y\n`, '', JSON.stringify({ token: `${NOW + 1200}.x.y` }), 'never'];
-    await admit(server, 'https://site.example/token', ending.signal);
+    await admit(server, fromSite('https://site.example/token'), say('error.token'), ending.signal);
     expect(server.token).toBe(`${NOW + 600}.x.y`);
     await vi.advanceTimersByTimeAsync(479_000);
     expect(server.token).toBe(`${NOW + 600}.x.y`);
-    await vi.advanceTimersByTimeAsync(7000); // the first try to renew it fails
+    await vi.advanceTimersByTimeAsync(12_000); // the first try to renew it fails
     expect(server.token).toBe(`${NOW + 1200}.x.y`);
     ending.abort();
     await vi.advanceTimersByTimeAsync(3_600_000);
@@ -41,7 +43,21 @@ describe('a token', () => {
   test('that does not come is one sentence', async () => {
     given = [''];
     const server = new Server(new URL('https://avatar.example/'));
-    await expect(admit(server, 'https://site.example/token', new AbortController().signal)).rejects.toThrow(/could not get a token/);
+    const none = admit(server, fromSite('https://site.example/token'), say('error.token'), new AbortController().signal);
+    await expect(none).rejects.toThrow(/could not get a token/);
+  });
+
+  test('is had for the key, which stands in no address', async () => {
+    const asked: [string, RequestInit][] = [];
+    vi.stubGlobal('fetch', async (url: string, options: RequestInit) => {
+      asked.push([url, options]);
+      return new Response(JSON.stringify({ token: `${NOW + 600}.x.y` }), { status: asked.length > 1 ? 401 : 200 });
+    });
+    const server = new Server(new URL('https://avatar.example/anna/#key=a b'));
+    await admit(server, byKey(server, 'a b'), say('error.key'), ending.signal);
+    expect(server.socket()).toBe(`wss://avatar.example/anna/ws?token=${NOW + 600}.x.y`);
+    expect(asked).toEqual([['https://avatar.example/anna/token', expect.objectContaining({ method: 'POST', headers: { Authorization: 'Bearer a b' } })]]);
+    await expect(admit(server, byKey(server, 'wrong'), say('error.key'), ending.signal)).rejects.toThrow(/key is wrong/);
   });
 });
 

@@ -1,0 +1,1 @@
+"""What a bundle tells of the avatar besides its looks."""

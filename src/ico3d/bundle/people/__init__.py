@@ -1,0 +1,1 @@
+"""Whose likeness a bundle is, and who agreed to it."""

@@ -1,0 +1,81 @@
+"""Where an avatar comes from: whose likeness it is, who agreed, who made it of what."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from ico3d.common.people.stated import NOT_STATED, is_stated
+from ico3d.common.typed import plain
+from ico3d.errors import BundleError
+
+SYNTHETIC = "synthetic"
+"""Kind of a recording that shows nobody: the person was modelled, and filmed inside a computer."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Origin of an avatar.
+
+    Attributes:
+        kind: Kind of the recordings, such as `portrait`; `synthetic` where nobody was recorded.
+        sources: What the avatar was made from.
+        consent: What the person agreed to, and how.
+        licence: Licence under which the avatar may be used.
+        likeness: Whose likeness the avatar is.
+        made_by: Who made the avatar.
+        made_on: Day on which it was baked, such as 2026-11-24.
+    """
+
+    kind: str
+    sources: tuple[str, ...]
+    consent: str
+    licence: str
+    likeness: str = NOT_STATED
+    made_by: str = NOT_STATED
+    made_on: str = NOT_STATED
+
+    @property
+    def is_synthetic(self) -> bool:
+        """Whether the avatar is nobody's likeness, so that nobody has to agree."""
+        return self.kind == SYNTHETIC
+
+    @property
+    def has_consent(self) -> bool:
+        """Whether it is said that the person agreed, or that there is no such person."""
+        return self.is_synthetic or is_stated(self.consent)
+
+
+REQUIRED = ("kind", "sources", "consent", "licence")
+"""Entries that a bundle must have.
+
+The other entries are newer; they are written only where they are stated, so that older programs
+read what they know.
+"""
+NEWER = {"likeness": NOT_STATED, "made_by": NOT_STATED, "made_on": NOT_STATED}
+
+
+def provenance_to_json(provenance: Provenance) -> dict[str, Any]:
+    """A provenance as a bundle stores it."""
+    return {key: v for key, v in plain(provenance).items() if key in REQUIRED or v != NOT_STATED}
+
+
+def with_newer(value: Any) -> Any:
+    """Adds what older bundles do not state to the parsed JSON of a provenance."""
+    return NEWER | cast(dict[str, Any], value) if isinstance(value, dict) else value
+
+
+def check_consent(provenance: Provenance, path: Path | str) -> None:
+    """Refuses to show somebody of whom nobody says that they agreed.
+
+    Args:
+        provenance: That of the bundle.
+        path: The bundle, for the sentence.
+
+    Raises:
+        BundleError: If the bundle shows a person and states no consent.
+    """
+    if not provenance.has_consent:
+        raise BundleError(
+            f"{path} does not say that the person it shows agreed to it: bake it again with "
+            "--consent, or, if you know that they agreed, serve it with --without-consent."
+        )

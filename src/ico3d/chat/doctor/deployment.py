@@ -1,0 +1,188 @@
+"""Whether an avatar at a URL is as visitors need it."""
+
+import asyncio
+import socket
+import ssl
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import httpx
+
+from ico3d.chat.doctor import visit
+from ico3d.chat.doctor.finding import Finding, bad, good, weak
+from ico3d.chat.serving.guard import LOOPBACK
+from ico3d.errors import SettingsError
+
+PATIENCE = 10.0  # s for an answer
+RENEWED = 14  # days before its end by which a certificate should have been renewed
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an avatar is.
+
+    Attributes:
+        scheme: `http` or `https`.
+        host: Name or address.
+        port: Port, or None for the scheme's own.
+    """
+
+    scheme: str
+    host: str
+    port: int | None
+
+    @classmethod
+    def of(cls, url: str) -> "Place":
+        """The place that a URL names.
+
+        Raises:
+            SettingsError: If it is no URL of a page.
+        """
+        given = SettingsError(f"{url}: give an address such as https://avatar.example.org.")
+        try:
+            parts = urlsplit(url)
+            host, port = parts.hostname, parts.port
+        except ValueError as error:
+            raise given from error
+        if not host or parts.scheme not in ("http", "https"):
+            raise given
+        if parts.path.strip("/") or parts.query:
+            raise SettingsError(f"{url}: an avatar is at the root of its address; leave the path.")
+        return cls(parts.scheme, host, port)
+
+    @property
+    def url(self) -> str:
+        """The address, without a slash at its end."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}" + (f":{self.port}" if self.port else "")
+
+
+def findings(url: str) -> Iterator[Finding]:
+    """Looks at a deployment from outside, as a visitor's browser would, and visits it.
+
+    Raises:
+        SettingsError: If the URL is none.
+    """
+    place = Place.of(url)
+    context = ssl.create_default_context()
+    reached = of_way(place)
+    yield reached
+    if reached.grade == "bad":
+        return
+    if place.scheme == "https":
+        found = of_certificate(place, context)
+        yield found
+        if found.grade == "bad":  # the rest can be looked at all the same
+            context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    with httpx.Client(base_url=place.url, verify=context, timeout=PATIENCE) as client:
+        answering = of_server(client, place)
+        yield answering
+        if answering.grade == "bad":
+            return
+        yield from of_pages(client)
+        if place.scheme == "https" and place.port in (None, 443):
+            yield of_plain(place)
+        cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+    visitor = visit.Visitor(place.url, context if place.scheme == "https" else None, cookies)
+    yield from asyncio.run(visitor.findings())
+
+
+def of_way(place: Place) -> Finding:
+    """Whether the host has an address and answers there, and whether microphones work."""
+    port = place.port or {"http": 80, "https": 443}[place.scheme]
+    try:
+        socket.create_connection((place.host, port), PATIENCE).close()
+    except socket.gaierror:
+        return bad(f"{place.host} has no address", "add it to the domain's name server.")
+    except OSError as error:
+        return bad(
+            f"{place.host} does not answer on port {port} ({error.strerror or error})",
+            "start the server, or open the port in the firewall.",
+        )
+    if place.scheme == "http" and place.host not in LOOPBACK:
+        return weak(
+            f"{place.url} answers, without HTTPS",
+            "browsers give no microphone to it; put a proxy with a certificate before it, or serve "
+            "with --tls.",
+        )
+    return good(f"{place.url} answers")
+
+
+def of_certificate(place: Place, context: ssl.SSLContext) -> Finding:
+    """Whether browsers believe the certificate, and for how long."""
+    try:
+        with (
+            socket.create_connection((place.host, place.port or 443), PATIENCE) as plain,
+            context.wrap_socket(plain, server_hostname=place.host) as secure,
+        ):
+            until = (secure.getpeercert() or {}).get("notAfter")
+    except ssl.SSLCertVerificationError as error:
+        return bad(
+            f"browsers warn of the certificate ({error.verify_message})",
+            "let the proxy get one from a public authority, or trust this one (SSL_CERT_FILE names "
+            "further ones here).",
+        )
+    except OSError as error:
+        return bad(f"no TLS connection ({error})", "look at the proxy's log.")
+    days = (ssl.cert_time_to_seconds(str(until)) - time.time()) / 86400
+    if days < RENEWED and place.host not in LOOPBACK:
+        return weak(f"the certificate ends in {days:.0f} days", "see why nothing renews it.")
+    return good(f"the certificate is valid for {days:.0f} days")
+
+
+def of_server(client: httpx.Client, place: Place) -> Finding:
+    """Whether the server is up, and takes visitors under this name."""
+    try:
+        answer = client.get("/ready")
+    except httpx.HTTPError as error:
+        return bad(f"no answer ({type(error).__name__})", "look at the log of proxy and server.")
+    if answer.status_code == 403:
+        return bad(
+            "the server does not know this name",
+            f"serve with --name {place.host}, and let the proxy leave Host as it is.",
+        )
+    if answer.status_code == 401:
+        return bad("the server wants a token or a key", "from here on nothing could be looked at.")
+    if answer.status_code == 503 and answer.headers.get("content-type") == "application/json":
+        return bad("the server is about to end", "wait until it has started again.")
+    if answer.status_code != 200:
+        return bad(
+            f"the server is not ready (status {answer.status_code})",
+            "start it, and give the proxy its address.",
+        )
+    return good("the server is ready for visitors")
+
+
+def of_pages(client: httpx.Client) -> Iterator[Finding]:
+    """Whether page and bundle come whole, protected and compressed, and figures do not."""
+    page = client.get("/")
+    if page.status_code != 200:
+        yield bad(f"the page does not come (status {page.status_code})", page.text.strip()[:200])
+    elif "content-security-policy" not in page.headers:
+        yield bad("headers that protect the page are lost", "let the proxy pass them on.")
+    elif "content-encoding" not in page.headers:
+        yield weak("the page is not compressed", "let the proxy pass Accept-Encoding on.")
+    else:
+        yield good("the page comes compressed, with the headers that protect it")
+    manifest = client.get("/bundle/manifest.json")
+    if manifest.status_code == 200:
+        yield good("the bundle is served")
+    else:
+        yield bad(f"the bundle is not served (status {manifest.status_code})", "see its log.")
+    if client.get("/metrics").status_code == 200:
+        yield bad("figures are public at /metrics", "let the proxy pass only the page's port on.")
+    else:
+        yield good("figures are not public")
+
+
+def of_plain(place: Place) -> Finding:
+    """Whether who types the name alone is led to HTTPS."""
+    try:
+        answer = httpx.get(f"http://{place.host}/", timeout=PATIENCE)
+    except httpx.HTTPError:
+        return weak("port 80 does not answer", "open it: who types the name alone begins there.")
+    if answer.headers.get("location", "").startswith("https://"):
+        return good("plain HTTP leads to HTTPS")
+    return weak("plain HTTP does not lead to HTTPS", "let the proxy redirect it.")

@@ -1,0 +1,101 @@
+"""Connections whose requests arrive promptly, so that nobody holds many of them by being slow.
+
+uvicorn waits for the head of a request for ever, and opens as many connections as there are
+descriptors: some hundred silent ones would close a server to everybody.
+"""
+
+import asyncio
+import resource
+from collections import Counter
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from ico3d.chat.serving.crowd import machine_of
+
+HEAD = 10.0  # s for the head of a request
+LARGEST_HEAD = 1 << 16  # bytes
+MOST_OPEN = 128  # connections of one machine, WebSockets aside
+DESCRIPTORS = 1 << 16  # that a server asks the system for
+_open: Counter[str] = Counter()
+
+
+class PromptProtocol(HttpToolsProtocol):
+    """HTTP on one connection, which is closed if a request's head takes too long or is too large.
+
+    One machine may have so many connections open and no more. Those of proxies that the operator
+    has stated, and of this machine, are not counted.
+    """
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Opens the connection, or closes it if its machine has too many."""
+        super().connection_made(transport)
+        proxies = getattr(self.app, "trusted_hosts", ())
+        self._machine = "" if self.client and self.client[0] in proxies else machine_of(self.client)
+        self._counted, self._head_bytes = True, 0
+        self._deadline: asyncio.TimerHandle | None = None
+        _open[self._machine] += 1
+        if self._machine and _open[self._machine] > MOST_OPEN:
+            transport.abort()
+        else:
+            self._await_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forgets the connection."""
+        self._stop_waiting()
+        self._uncount()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Takes bytes, unless they make a head too large."""
+        if self._deadline is not None:
+            self._head_bytes += len(data)
+            if self._head_bytes > LARGEST_HEAD:
+                self.transport.abort()
+                return
+        super().data_received(data)
+
+    def on_headers_complete(self) -> None:
+        """The head of a request has arrived."""
+        self._stop_waiting()
+        super().on_headers_complete()
+
+    def on_response_complete(self) -> None:
+        """The next request may follow, and has to soon."""
+        super().on_response_complete()
+        if not self.transport.is_closing():
+            self._await_head()
+
+    def handle_websocket_upgrade(self) -> None:
+        """Hands the connection over; WebSockets are counted elsewhere."""
+        self._uncount()
+        super().handle_websocket_upgrade()
+
+    def _await_head(self) -> None:
+        self._stop_waiting()
+        self._head_bytes = 0
+        self._deadline = self.loop.call_later(HEAD, self._give_up)
+
+    def _stop_waiting(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+    def _give_up(self) -> None:
+        self._deadline = None
+        if self.cycle is None or self.cycle.response_complete:  # else a pipelined one is answered
+            self.transport.abort()
+
+    def _uncount(self) -> None:
+        if self._counted:
+            self._counted = False
+            _open[self._machine] -= 1
+            if not _open[self._machine]:
+                del _open[self._machine]
+
+
+def allow_many_connections() -> None:
+    """Has the system allow as many open connections as it lets this process have."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

@@ -1,0 +1,91 @@
+"""`ico3d doctor`: finds what is wrong with a machine or a deployment, and says what helps."""
+
+import asyncio
+from pathlib import Path
+
+import httpx
+import pytest
+
+from ico3d.chat.doctor import deployment, machine, visit
+from ico3d.chat.doctor.deployment import Place
+from ico3d.cli import main
+from ico3d.errors import SettingsError
+from support.chat.serving import TYPED, free_port, serving
+
+pytestmark = pytest.mark.slow
+
+
+def grades(findings):
+    return [finding.grade for finding in findings]
+
+
+def told(findings, grade="bad"):
+    return [f"{one.what}: {one.mend}" for one in findings if one.grade == grade]
+
+
+def looked_at(url):
+    """All that is found from outside, in a thread: the server runs in the loop."""
+    return asyncio.to_thread(lambda: list(deployment.findings(url)))
+
+
+async def test_a_server_that_is_well(bundle):
+    async with serving(bundle, TYPED) as (url, sessions):
+        found = await looked_at(url)
+        while len(sessions):  # the doctor's place is free again
+            await asyncio.sleep(0.01)
+    assert not told(found), found
+    assert "a conversation goes on after a lost connection (4 of 4)" in [f.what for f in found]
+
+
+async def test_a_server_that_ends_or_has_not_the_session(bundle, monkeypatch):
+    async with serving(bundle, TYPED) as (url, sessions):
+        monkeypatch.setattr(sessions, "_resumable", lambda hello: False)  # as another one
+        (lost,) = told(await looked_at(url))
+        assert lost.startswith("a page that loses its connection reaches another server: ")
+        sessions.line.close()
+        assert told(await looked_at(url))[0].startswith("the server is about to end: ")
+
+
+async def test_a_name_that_the_server_does_not_know(bundle):
+    async with serving(bundle, TYPED) as (url, _):
+        place = Place.of(url)
+        headers = {"Host": "avatar.example"}
+        with httpx.Client(base_url=url, headers=headers) as client:
+            found = await asyncio.to_thread(deployment.of_server, client, place)
+    assert found.grade == "bad" and f"--name {place.host}" in found.mend
+
+
+async def test_where_nothing_is():
+    (found,) = await looked_at(f"http://127.0.0.1:{free_port()}")
+    assert found.grade == "bad" and "does not answer" in found.what
+    (found,) = await visit.Visitor(f"http://127.0.0.1:{free_port()}", None, "").findings()
+    assert found.grade == "bad" and found.what.startswith("no WebSocket can be opened")
+
+
+@pytest.mark.parametrize(
+    "url", ["avatar.example", "ftp://a", "http://[", "http://a/b", "http://a:x"]
+)
+def test_what_is_no_address(url):
+    with pytest.raises(SettingsError):
+        Place.of(url)
+
+
+def test_this_machine_and_an_avatar(bundle_path, tmp_path, capsys):
+    found = list(machine.of_avatar(bundle_path, None))
+    assert not told(found) and any("started in" in one.what for one in found)
+    settings = tmp_path / "talk.toml"
+    settings.write_text('[voice]\nuse = "nobody"\n')
+    assert "voice 'nobody' is unknown" in told(machine.of_avatar(bundle_path, settings))[0]
+    missing = Path("not-there.ico3d")
+    assert main(["doctor", "--bundle", str(missing), "--port", str(free_port())]) == 1
+    shown = capsys.readouterr()
+    assert "✗ no conversation can begin: " in shown.out and "must be mended" in shown.err
+
+
+def test_a_port_that_is_taken():
+    from ico3d.chat.serving import server
+
+    with server.bind("127.0.0.1", 0) as listener:
+        listener.listen()
+        assert machine.of_port(listener.getsockname()[1]).grade == "weak"
+    assert machine.of_port(free_port()).grade == "good"
