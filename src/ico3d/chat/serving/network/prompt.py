@@ -31,7 +31,7 @@ class PromptProtocol(HttpToolsProtocol):
         super().connection_made(transport)
         proxies = getattr(self.app, "trusted_hosts", ())
         self._machine = "" if self.client and self.client[0] in proxies else machine_of(self.client)
-        self._counted, self._head_bytes = True, 0
+        self._counted, self._head_bytes, self._in_body = True, 0, False
         self._deadline: asyncio.TimerHandle | None = None
         _open[self._machine] += 1
         if self._machine and _open[self._machine] > MOST_OPEN:
@@ -48,7 +48,7 @@ class PromptProtocol(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         """Takes bytes, unless they make a head too large."""
         super().data_received(data)
-        if self._deadline is not None:  # the head has not ended; else a body may have come with it
+        if self._deadline is not None and not self._in_body:  # of a refused request, too
             self._head_bytes += len(data)
             if self._head_bytes > LARGEST_HEAD:
                 self.transport.abort()
@@ -56,7 +56,13 @@ class PromptProtocol(HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         """The head of a request has arrived."""
         self._stop_waiting()
+        self._in_body = True
         super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        """A request has arrived as a whole."""
+        self._in_body = False
+        super().on_message_complete()
 
     def on_response_complete(self) -> None:
         """The next request may follow, and has to soon."""
