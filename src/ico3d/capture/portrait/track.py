@@ -58,19 +58,19 @@ class PortraitSettings:
         size: Upper limit of the pictures' short side in pixels; larger videos are scaled down.
         focal: Focal length in pixels of the original video; None to estimate it.
         refine: Whether to correct the poses by pictures of the whole head.
-        likeness: Whose likeness it is: the person's name.
         consent: What the person agreed to, and how.
         licence: Licence of the recording.
         device: Where to correct the poses.
+        likeness: Whose likeness it is: the person's name.
     """
 
     size: int = 512
     focal: float | None = None
     refine: bool = True
-    likeness: str = NOT_STATED
     consent: str = NOT_STATED
     licence: str = NOT_STATED
     device: DeviceName = "auto"
+    likeness: str = field(default=NOT_STATED, kw_only=True)
 
 
 @dataclass
