@@ -62,6 +62,7 @@ VERBS: dict[str, Verb] = {
     "bake": Verb("ico3d.avatar.baking.command", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
+    "forget": Verb("ico3d.avatar.forgetting.command", "Forget", "remove what is here of a person"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
     "token": Verb("ico3d.chat.commands", "Token", "make a token for pages that embed an avatar"),

@@ -1,0 +1,1 @@
+"""Removes what a project folder holds of a person."""

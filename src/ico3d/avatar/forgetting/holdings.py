@@ -1,0 +1,131 @@
+"""What a project folder holds of people: recordings, models, runs, bundles, and whose they are."""
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ico3d.avatar.models import KINDS
+from ico3d.bundle.archive import open_archive
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.manifest import MANIFEST, Manifest
+from ico3d.common.people.stated import BETWEEN, NOBODY, is_stated
+from ico3d.errors import Ico3dError
+
+RUN = "settings.json"
+"""File of every training, finished or not, that names what it was made of."""
+MADE_OF = ("capture", "head", "continued")
+"""Entries of `RUN` that are paths."""
+RECORDINGS = {
+    "transforms_train.json": "ico3d.json",
+    "cameras.json": "cameras.json",
+    "capture.json": "capture.json",
+}
+"""Files that mark folders of recordings, and those that say of whom: also of incomplete ones.
+
+Files of data sets lie among others', and are named by their paths.
+"""
+MODELS = tuple(kind.file for kind in KINDS if kind.model is not Bundle)
+
+
+@dataclass(frozen=True)
+class Holding:
+    """Something that shows a person.
+
+    Attributes:
+        path: A folder or a file; absolute, links not followed.
+        what: What it is, for people.
+        likenesses: Whose likeness it is; empty where that is not stated.
+        made_of: What it was made of: recordings and models.
+        sources: What a recording was made from, as it states it.
+    """
+
+    path: Path
+    what: str
+    likenesses: tuple[str, ...]
+    made_of: tuple[Path, ...] = ()
+    sources: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> set[str]:
+        """The people whom it shows, in small letters; of synthetic people nobody."""
+        return {name.casefold() for name in self.likenesses if name != NOBODY}
+
+    def lies_in(self, path: Path) -> bool:
+        """Whether it is a path, or below it."""
+        return self.path.is_relative_to(path)
+
+
+def find_holdings(project: Path) -> list[Holding]:
+    """Finds all that shows people in a folder and below it, but for hidden folders.
+
+    Args:
+        project: The folder, absolute. Linked folders in it are looked at, but not below.
+    """
+    return list(_walk(project))
+
+
+def _walk(project: Path) -> Iterator[Holding]:
+    for place, folders, files in os.walk(project):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        folder = Path(place)
+        linked = (folder / name for name in folders if (folder / name).is_symlink())
+        for candidate in (folder, *linked):
+            if candidate != project and (found := _folder(candidate)) is not None:
+                yield found
+        for name in sorted(files):
+            if name.endswith(".ico3d"):
+                yield _bundle(folder / name)
+
+
+def _folder(folder: Path) -> Holding | None:
+    """What a folder is; None where it is none of ours."""
+    about = next((file for mark, file in RECORDINGS.items() if (folder / mark).is_file()), None)
+    if about is not None:
+        return _recording(folder, about)
+    if (folder / MANIFEST).is_file():
+        return _bundle(folder)
+    run, models = _json(folder / RUN), [_json(folder / name) for name in MODELS]
+    if not any(models) and "capture" not in run:
+        return None
+    made_of = [Path(run[name]) for name in MADE_OF if isinstance(run.get(name), str)]
+    parts = [model.get("summary", {}) for model in models]
+    stated = [part.get(key, {}) for part in parts for key in ("capture", "head", "body")]
+    names = [about.get("likeness", "") for about in stated if isinstance(about, dict)]
+    what = "a model" if any(models) else "an unfinished training"
+    return Holding(folder, what, _named(*map(str, names)), tuple(made_of))
+
+
+def _recording(folder: Path, file: str) -> Holding:
+    known = _json(folder / file)
+    about = known.get("provenance", known)
+    about = about if isinstance(about, dict) else {}
+    sources = about.get("sources", ())
+    sources = tuple(map(str, sources)) if isinstance(sources, list) else ()
+    likeness = NOBODY if file == "capture.json" else str(about.get("likeness", ""))
+    return Holding(folder, "a recording", _named(likeness), (), sources)
+
+
+def _bundle(path: Path) -> Holding:
+    try:
+        about = Manifest.from_json(open_archive(path).read(MANIFEST)).provenance
+    except (Ico3dError, KeyError):  # damaged, but here
+        return Holding(path, "a bundle", ())
+    return Holding(path, "a bundle", (NOBODY,) if about.is_synthetic else _named(about.likeness))
+
+
+def _named(*likenesses: str) -> tuple[str, ...]:
+    """Each person once, of texts that may name several."""
+    names = (name.strip() for text in likenesses for name in text.split(BETWEEN))
+    return tuple(dict.fromkeys(name for name in names if is_stated(name)))
+
+
+def _json(file: Path) -> dict[str, Any]:
+    """The content of a JSON file; empty where there is none that can be read."""
+    try:
+        content = json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}

@@ -1,0 +1,182 @@
+"""`ico3d forget`: a project of two people, of which one goes."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ico3d.bundle.format import write_bundle
+from ico3d.bundle.people.provenance import Provenance
+from ico3d.cli import main
+from support.bundles.random_bundle import random_files, random_head, random_manifest
+from support.recordings.multiview_folders import entry, ring, write_cameras
+
+
+def recording(folder: Path, **stated: str) -> Path:
+    folder.mkdir(parents=True)
+    write_cameras(folder, [entry(camera) for camera in ring(2)], 3, **stated)
+    (folder / "tracking.safetensors").write_bytes(b"a track")
+    return folder
+
+
+def model(folder: Path, about: str = "", summary: dict | None = None, **made_of: Path) -> Path:
+    folder.mkdir(parents=True)
+    run = {name: str(path) for name, path in made_of.items()}
+    (folder / "settings.json").write_text(json.dumps(run | {"seed": 0}))
+    if about:
+        (folder / about).write_text(json.dumps({"summary": summary or {}}))
+    return folder
+
+
+def bundle(path: Path, likeness: str, kind: str = "portrait") -> Path:
+    head = random_head(10)
+    provenance = Provenance(kind, ("it",), "agreed", "CC0-1.0", likeness)
+    manifest = replace(random_manifest(head), provenance=provenance)
+    write_bundle(path, manifest, random_files(head))
+    return path
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """Ada's and Bob's recordings, and what was made of them."""
+    work = tmp_path / "work"
+    face = recording(work / "captures/face", likeness="Ada", sources=["ada.mp4"])
+    hall = recording(work / "captures/hall", likeness="Ada")
+    bob = recording(work / "captures/bob", likeness="Bob")
+    head = model(work / "models/head", "head.json", capture=face)  # of an earlier version
+    model(
+        work / "models/ada", "avatar.json", {"body": {"likeness": "Ada"}}, capture=hall, head=head
+    )
+    model(work / "models/ada/body/0000", capture=hall)
+    model(work / "models/tried", capture=face)
+    model(work / "models/bob", "head.json", {"capture": {"likeness": "Bob"}}, capture=bob)
+    model(work / "models/bob/windows/0000", capture=bob)
+    bundle(work / "ada.ico3d", "Ada")
+    bundle(work / "bob.ico3d", "Bob")
+    bundle(work / "iris.ico3d", "not stated", "synthetic")
+    bundle(work / "old.ico3d", "not stated")
+    (work / "ada.mp4").write_bytes(b"a film")
+    (work / ".git").mkdir()
+    bundle(work / ".git/ada.ico3d", "Ada")
+    monkeypatch.chdir(work)
+    return work
+
+
+def there(project: Path) -> set[str]:
+    names = ("captures/*", "models/*", "*.ico3d", "*.mp4")
+    return {str(path.relative_to(project)) for name in names for path in project.glob(name)}
+
+
+OTHERS = {"captures/bob", "models/bob", "bob.ico3d", "iris.ico3d", "old.ico3d"}
+
+
+def test_all_that_shows_a_person_goes_and_nothing_else(project, capsys):
+    assert main(["forget", "ada", "--yes"]) == 0
+    assert there(project) == OTHERS | {"ada.mp4"}
+    assert (project / "models/bob/windows/0000/settings.json").is_file()
+    listed, _, remaining = capsys.readouterr().out.partition("6 removed. What may remain")
+    assert f"{project}/captures/face: a recording of Ada" in listed
+    assert f"{project}/models/head: a model\n" in listed
+    assert f"{project}/models/ada: a model, an unfinished training of Ada" in listed
+    assert "- what a recording was made from: ada.mp4" in remaining
+    assert (
+        f"- {project}/old.ico3d, a bundle that does not say whom it shows: look at it" in remaining
+    )
+    assert "bob" not in remaining and "iris" not in remaining
+    for elsewhere in ("bundles that were served", "films", "backups", "voices"):
+        assert elsewhere in remaining
+
+
+def test_a_path_stands_for_the_person_and_for_itself(project):
+    assert main(["forget", "captures/face", "ada.mp4", "old.ico3d", "--yes"]) == 0
+    assert there(project) == OTHERS - {"old.ico3d"}
+
+
+def test_a_model_that_states_nothing_takes_along_what_was_made_of_it(project, capsys):
+    assert main(["forget", "models/head", "--yes"]) == 0
+    gone = {"models/head", "models/ada"}
+    assert there(project) == (OTHERS | SHOWING_ADA) - gone
+    assert f"- {project}/captures/face, of which something was made" in capsys.readouterr().out
+
+
+SHOWING_ADA = {
+    "captures/face",
+    "captures/hall",
+    "models/head",
+    "models/ada",
+    "models/tried",
+    "ada.ico3d",
+    "ada.mp4",
+}
+
+
+def test_an_avatar_of_two_people_does_not_take_the_other_along(project):
+    both = model(
+        project / "models/both",
+        "avatar.json",
+        {"head": {"likeness": "Ada"}, "body": {"likeness": "Bob"}},
+        capture=project / "captures/bob",
+    )
+    assert main(["forget", "models/both", "--yes"]) == 0
+    assert there(project) == OTHERS | SHOWING_ADA
+    both = model(both, "avatar.json", {"head": {"likeness": "Ada; Bob"}}, capture=project / "x")
+    assert main(["forget", "Bob", "--yes"]) == 0
+    assert there(project) == (OTHERS | SHOWING_ADA) - {"captures/bob", "models/bob", "bob.ico3d"}
+
+
+def test_links_go_and_what_they_lead_to_is_named(project, tmp_path, capsys):
+    elsewhere = recording(tmp_path / "archive", likeness="Ada")
+    (project / "captures/linked").symlink_to(elsewhere)
+    assert main(["forget", "Ada", "--yes"]) == 0
+    assert there(project) == OTHERS | {"ada.mp4"} and (elsewhere / "cameras.json").is_file()
+    said = capsys.readouterr().out
+    assert f"- {elsewhere}, to which {project}/captures/linked led" in said
+
+
+def test_damaged_things_are_no_obstacle(project):
+    (project / "captures/hall/cameras.json").write_text("{")
+    (project / "old.ico3d").write_bytes(b"no bundle")
+    assert main(["forget", "Ada", "captures/hall", "--yes"]) == 0
+    assert there(project) == OTHERS | {"ada.mp4"}
+
+
+def test_nothing_goes_before_somebody_agrees(project, monkeypatch, capsys):
+    assert main(["forget", "Ada"]) == 1
+    assert "nothing was removed: agree to it with --yes." in capsys.readouterr().err
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
+    monkeypatch.setattr("rich.prompt.Confirm.ask", lambda *_, **__: False)
+    assert main(["forget", "Ada"]) == 1
+    assert there(project) == OTHERS | SHOWING_ADA
+    monkeypatch.setattr("rich.prompt.Confirm.ask", lambda *_, **__: True)
+    assert main(["forget", "Ada"]) == 0
+    assert there(project) == OTHERS | {"ada.mp4"}
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "needs a person's name"),
+        (["Eve"], "is the likeness of Eve; stated are: Ada, Bob. Name paths"),
+        (["captures/eve"], "there is nothing at captures/eve."),
+        (["."], "does not lie below"),
+        (["../other"], "does not lie below"),
+        (["captures/bob", "--project", "models"], "does not lie below"),
+    ],
+)
+def test_what_makes_no_sense_is_one_sentence(project, capsys, words, sentence):
+    (project.parent / "other").mkdir()
+    assert main(["forget", *words, "--yes"]) == 1
+    assert sentence in capsys.readouterr().err
+    assert there(project) == OTHERS | SHOWING_ADA
+
+
+def test_what_cannot_be_removed_is_named(project, monkeypatch, capsys):
+    def fail(path):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("shutil.rmtree", fail)
+    assert main(["forget", "captures/face", "ada.ico3d", "--yes"]) == 1
+    assert f"{project}/captures/face (Permission denied)" in capsys.readouterr().err
+    assert "ada.ico3d" not in there(project)
