@@ -96,7 +96,7 @@ def check_sentence(sentence: str) -> None:
     }
     for fault, found in faults.items():
         if found:
-            raise Unclear(f"the sentence {fault}: {sentence[:200]!r}")
+            raise Unclear(f"the sentence {fault}")
 
 
 def _contents(folder: Path) -> Files:

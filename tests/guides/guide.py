@@ -89,8 +89,8 @@ def _visit(words: list[str]) -> None:
 
     made, seen = server.make_server, []
 
-    def with_a_visitor(app, certificate=None):
-        running = made(app, certificate)
+    def with_a_visitor(*served):
+        running = made(*served)
         threading.Thread(target=_look, args=(running, seen), daemon=True).start()
         return running
 

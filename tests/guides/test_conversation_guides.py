@@ -73,8 +73,8 @@ def visited(monkeypatch, capsys):
     monkeypatch.setattr("ico3d.chat.parts.make_parts", described)
     made = server.make_server
 
-    def with_a_visitor(app, certificate=None):
-        running = made(app, certificate)
+    def with_a_visitor(*served):
+        running = made(*served)
         threading.Thread(target=_visit, args=(running,), daemon=True).start()
         return running
 

@@ -22,6 +22,7 @@ import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { offerDrawing } from './ui/sheets/drawing.ts';
+import { showOrigin } from './ui/sheets/origin.ts';
 import { makeThemeButton, showTheme } from './ui/theme.ts';
 import type { PageWords } from './words/page-words.ts';
 import { codeOf, say, type Sentence } from './words/text.ts';
@@ -116,6 +117,7 @@ export class Visit {
     const name = nameOf(manifest);
     byId(root, 'name').textContent = name;
     root.style.setProperty('--backdrop', cssColour(manifest.background));
+    showOrigin(root, words, manifest.provenance);
     this.overlay.greet(manifest, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
     this.ports.named(name);
 

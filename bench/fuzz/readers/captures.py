@@ -45,7 +45,7 @@ def _capture(folder: Path) -> None:
     for frame in range(min(capture.num_frames, 2)):
         capture.world_from_head(frame), capture.eyes(frame), capture.blendshapes(frame)
         capture.landmarks_3d(frame), capture.head_points(frame), capture.world_points(frame)
-    capture.audio(), capture.provenance, capture.inspect()
+    capture.audio(), capture.provenance, capture.inspect(), getattr(capture, "phonemes", ())
     capture.body_track()
 
 

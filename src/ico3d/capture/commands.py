@@ -43,7 +43,8 @@ class Portrait:
 
     def run(self) -> None:
         """Tracks the video and writes the folder."""
-        from ico3d.capture.portrait.track import PortraitSettings, track_portrait
+        from ico3d.capture.portrait.settings import PortraitSettings
+        from ico3d.capture.portrait.track import track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
         about = (self.likeness, self.consent, self.licence)

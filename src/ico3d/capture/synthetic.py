@@ -12,6 +12,7 @@ from safetensors.numpy import load
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
 from ico3d.capture.decoding import DAMAGED, unit
+from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
 from ico3d.common.people.stated import NOBODY
@@ -38,8 +39,9 @@ class SyntheticCapture(RecordedCapture):
         self.path = path
         about = _read_json(path / "capture.json")
         self._about = about
-        self.fps = float(about["fps"])
-        self.num_frames = int(about["num_frames"])
+        where = str(path / "capture.json")
+        self.fps = number(about, "fps", where, 1e-3, 1e5)
+        self.num_frames = int(number(about, "num_frames", where, 1, MOST_FRAMES))
         self.blendshape_names = tuple(about["blendshape_names"])
         self.cameras = tuple(_camera(c, path) for c in about["cameras"])
         self.shows = "body" if about.get("shows", "head") == "body" else "head"
@@ -53,7 +55,11 @@ class SyntheticCapture(RecordedCapture):
     @property
     def phonemes(self) -> tuple[tuple[float, str], ...]:
         """Pairs of start in seconds and IPA symbol of what is said; an empty symbol is a pause."""
-        return tuple((float(t), str(s)) for t, s in self._about.get("phonemes", ()))
+        try:
+            return tuple((float(t), str(s)) for t, s in self._about.get("phonemes", ()))
+        except (TypeError, ValueError, OverflowError) as error:
+            where = self.path / "capture.json"
+            raise CaptureError(f"{where}: its phonemes are damaged: record again.") from error
 
     @property
     def provenance(self) -> dict:
@@ -199,6 +205,9 @@ def _read_json(file: Path) -> dict:
     missing = [name for name in NEEDED if name not in about]
     if missing:
         raise CaptureError(f"{file} lacks {', '.join(missing)}: record again.")
+    for name in ("blendshape_names", "cameras", "sources"):
+        if not isinstance(about[name], list):
+            raise CaptureError(f"{file}: {name} must be a list: record again.")
     return about
 
 
@@ -211,7 +220,7 @@ def _camera(entry: dict, path: Path) -> Camera:
             np.array(entry["world_to_camera"], float),
             str(entry["name"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise CaptureError(f"{path / 'capture.json'}: a camera is damaged: {error}.") from error
 
 

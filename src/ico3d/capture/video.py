@@ -28,6 +28,7 @@ class Video:
         rate: Mean pictures per second that the file claims; 0 if it does not say.
         damaged: Number of packets that could not be decoded.
         decoded: Number of pictures that were decoded.
+        times: Seconds of each decoded picture after the first one.
     """
 
     path: Path
@@ -38,6 +39,7 @@ class Video:
     rate: float
     damaged: int = field(default=0)
     decoded: int = field(default=0)
+    times: list[float] = field(default_factory=list)
 
     def frames(self, fps: float) -> Iterator[np.ndarray]:
         """Yields pictures resampled by time: number k is the one nearest to k / fps seconds.
@@ -77,7 +79,8 @@ class Video:
                 self.decoded += 1
                 seconds = frame.time if frame.time is not None else (first or 0.0) + self.decoded
                 first = seconds if first is None else first
-                yield seconds - first, self._picture(frame)
+                self.times.append(seconds - first)
+                yield self.times[-1], self._picture(frame)
 
     def _picture(self, frame) -> np.ndarray:
         """One decoded frame, scaled and turned as it is to be displayed."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -73,14 +74,15 @@ class TrainHead(HeadChoice):
 
         from ico3d.capture.formats import open_capture
         from ico3d.head.train_head import HeadJob, needs_of_head, train_head
+        from ico3d.head.watch import live_page
 
         given = (self.inputs, self.variant, self.encoder, self.seed, self.settings)
         job = HeadJob(*given, self.hold_out, self.over_torso)
-        port = self.watch_port if self.watch else None
+        watched = partial(live_page, port=self.watch_port) if self.watch else None
         capture = open_capture(self.capture)
         if self.dry_run:
             print(*needs_of_head(capture, job, self.device).lines(self.out), sep="\n")
             return
-        head = train_head(capture, self.out, job, port, self.device)
+        head = train_head(capture, self.out, job, watched, self.device)
         seconds = head.summary["train_seconds"]
         Console().print(f"{self.out}: {len(head.model)} Gaussians, trained in {seconds:.0f} s.")

@@ -1,5 +1,6 @@
 """Trains a head on a capture and writes the model folder."""
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -29,16 +30,17 @@ from ico3d.head.model import Variant
 from ico3d.head.model_folder import Inputs, TrainedHead
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import HeadSettings
-from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.lip_reading import read_lips
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.device import computing_device
 from ico3d.training.dry_run import Needs, needs_of
-from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.loop import LoopSettings, Watch, run_loop
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
-from ico3d.training.watch import LivePage
+
+Watched = Callable[[HeadTrainer], AbstractContextManager[Watch]]
+"""Makes the observer of a training."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def train_head(
     capture: Capture,
     folder: Path,
     job: HeadJob,
-    watch_port: int | None = None,
+    watched: Watched | None = None,
     device: DeviceName = "auto",
 ) -> TrainedHead:
     """Trains a head, or continues an interrupted run of the same settings.
@@ -86,7 +88,7 @@ def train_head(
             body, the head is cut out of its pictures, and its test cameras are left out.
         folder: The model folder, which also holds metrics and checkpoints.
         job: Inputs, variant, seed and settings.
-        watch_port: Port of a live page that shows the training; None for no page.
+        watched: Makes what observes the training while it lasts, such as a live page.
         device: Where to compute; a resumed run may use another device.
 
     Returns:
@@ -97,7 +99,6 @@ def train_head(
         SettingsError: If the folder holds a run with other settings, or CUDA is asked for and does
             not work.
         ModelError: If training diverges.
-        MissingExtraError: If a live page is wanted and viser is not installed.
     """
     run = RunFolder(folder, job.about(capture.path))
     if run.finished() is not None:
@@ -108,8 +109,8 @@ def train_head(
     note_environment(folder, trainer.model.device)
     every = job.settings.checkpoint_every
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
-    with _page(trainer, watch_port) as page:
-        seconds = run_loop(trainer, run, loop, page)
+    with nullcontext() if watched is None else watched(trainer) as watch:
+        seconds = run_loop(trainer, run, loop, watch)
     names = track.names if isinstance(track, BlendshapeTrack) else ()
     summary = {
         "train_seconds": seconds,
@@ -165,11 +166,6 @@ def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:
     if not isinstance(track, SpeechTrack):
         return EyeRange()
     return eye_range(track.eyes[list(capture.split.train)].numpy())
-
-
-def _page(trainer: HeadTrainer, port: int | None) -> AbstractContextManager[LivePage | None]:
-    """The page that shows the training, if there is to be one."""
-    return nullcontext() if port is None else LivePage(WatchedHead(trainer), port)
 
 
 def _inputs(

@@ -14,7 +14,7 @@ from ico3d.head.optimise import HeadTrainer
 from ico3d.head.views import View, staged
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
-from ico3d.training.watch import Slider
+from ico3d.training.watch import LivePage, Slider
 
 MOST_SLIDERS = 12
 SAMPLES = 100
@@ -85,6 +85,15 @@ class WatchedHead:
             Slider(name, round(float(values.min()), 3), round(float(values.max()), 3))
             for name, values in columns.items()
         ]
+
+
+def live_page(trainer: HeadTrainer, port: int) -> LivePage:
+    """A page in the browser that shows a training, on this port or the next free one.
+
+    Raises:
+        MissingExtraError: If viser is not installed.
+    """
+    return LivePage(WatchedHead(trainer), port)
 
 
 def _named_inputs(model: HeadModel, track: ExpressionTrack) -> dict[str, int]:

@@ -171,7 +171,7 @@ def test_the_verb_films_a_body(tmp_path, capture, capsys):
     size = ("--size", str(WIDTH), str(HEIGHT))
     from ico3d.cli import main
 
-    words = ["render", str(tmp_path / "body"), str(tmp_path / "out.mp4"), *size]
+    words = ["render", str(tmp_path / "body"), str(tmp_path / "out.mp4"), *size, "--no-ai-mark"]
     assert main([*words, "--seconds", "0.5", "--fps", "24", "--background", "#0080ff"]) == 0
     found, rate, _ = _decoded(tmp_path / "out.mp4")
     assert (len(found), rate, found[0].shape) == (12, 24.0, (HEIGHT, WIDTH, 3))

@@ -9,11 +9,12 @@ import torch
 
 from ico3d.capture.face.mediapipe_face import LANDMARKS, MESH_LANDMARKS, CanonicalFace, Face
 from ico3d.capture.formats import open_capture
-from ico3d.capture.portrait import photometric_poses, track
+from ico3d.capture.portrait import photometric_poses, readings, track
 from ico3d.capture.portrait.files import save_picture, save_torso
 from ico3d.capture.portrait.parsing import FACE
 from ico3d.capture.portrait.rigid_head import Track
-from ico3d.capture.portrait.track import PortraitSettings, track_portrait
+from ico3d.capture.portrait.settings import PortraitSettings
+from ico3d.capture.portrait.track import track_portrait
 from ico3d.errors import SettingsError
 from ico3d.splat.device import cuda_fault
 from support.pretended_cuda import pretended_cuda
@@ -72,10 +73,11 @@ def _mattes(work, readings, video=None):
 def video(tmp_path, monkeypatch):
     """A film, and a machine on which everything but the refinement has been done before."""
     monkeypatch.setattr(track, "model_file", lambda *_: tmp_path)
-    monkeypatch.setattr(track, "FaceReader", Reader)
+    monkeypatch.setattr(readings, "FaceReader", Reader)
     face = CanonicalFace(_POINTS, np.zeros((0, 3), int), np.ones(MESH_LANDMARKS))
     monkeypatch.setattr(track, "canonical_face", lambda _: face)
-    monkeypatch.setattr(track, "_track", lambda *_: _TRACK)
+    monkeypatch.setattr(track, "_fitted", lambda *_: _TRACK)
+    monkeypatch.setattr(track, "_aligned", lambda *given: given[2])
     monkeypatch.setattr(track, "_save_mattes", _mattes)
     monkeypatch.setattr(track, "_points", lambda *_: _POINTS)
     monkeypatch.setattr(photometric_poses, "COUNT", 200)

@@ -118,7 +118,7 @@ def _textured_frames(poses, focal):
 
 
 def test_alignment_removes_the_jitter_of_landmarks():
-    from ico3d.capture.portrait.picture_poses import align
+    from ico3d.capture.portrait.picture_poses import align, smoothed
 
     random = np.random.default_rng(4)
     poses, focal = _poses(24, swing=0.12), 1100.0
@@ -134,6 +134,6 @@ def test_alignment_removes_the_jitter_of_landmarks():
         away = found.project() - truth
         return np.sqrt(((away - away.mean(0)) ** 2).sum(-1).mean())
 
-    aligned = align(track, np.ones(80, bool), lambda frame: images[frame])
+    aligned = align(smoothed(track), np.ones(80, bool), lambda frame: images[frame])
     assert spread(track) > 0.5
     assert spread(aligned) < 0.25 * spread(track)

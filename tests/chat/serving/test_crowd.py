@@ -1,11 +1,13 @@
-"""One machine takes neither all connections of a server nor all of its queue."""
+"""One machine takes neither all connections and places of a server nor all of its queue."""
 
 import asyncio
 import contextlib
+from collections import Counter
 
 import pytest
 
-from ico3d.chat.serving.crowd import MOST_SOCKETS, Crowd, machine_of
+from ico3d.chat.serving import crowd as crowds
+from ico3d.chat.serving.crowd import MOST_SOCKETS, Crowd, Meters, machine_of
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.waiting import MOST_WAITING, FullError, WaitingLine
 
@@ -86,3 +88,53 @@ async def test_dropped_pages_of_one_machine_leave_half_of_the_queue():
         line.join(None, f"10.0.1.{number}")
     with pytest.raises(FullError):
         line.join(None, "")
+
+
+def test_machines_do_not_use_up_each_others_share():
+    now = 0.0
+    meters = Meters(1.0, 2.0, lambda: now)
+    assert [meters.take("10.0.0.7") for _ in range(3)] == [True, True, False]
+    assert meters.take("10.0.0.8")
+    assert all(meters.take("") for _ in range(9))  # nobody knows who that is
+    now = 1.0
+    assert meters.take("10.0.0.7") and not meters.take("10.0.0.7")
+
+
+def test_who_used_nothing_lately_is_forgotten(monkeypatch):
+    monkeypatch.setattr(crowds, "REMEMBERED", 3)
+    now = 0.0
+    meters = Meters(1.0, 1.0, lambda: now)
+    assert all(meters.take(f"10.0.0.{number}") for number in (1, 2))
+    now = 0.5
+    assert meters.take("10.0.0.3")
+    now = 1.2
+    assert meters.take("10.0.0.4")  # of more than three, those that are full again go
+    assert not meters.take("10.0.0.3") and len(meters._buckets) == 2
+    for number in range(9):
+        meters.take(f"10.0.1.{number}")
+    assert len(meters._buckets) == 3
+
+
+def has_half(held):
+    return lambda machine, kept: machine == "" or held[machine] + kept < 2
+
+
+async def test_one_machine_leaves_half_of_the_places():
+    held, free = Counter(), 4
+    line = WaitingLine(lambda: free, has_share=has_half(held))
+    first, second, third = [line.join(None, "10.0.0.7") for _ in range(3)]
+    assert [ticket.admitted for ticket in (first, second, third)] == [True, True, False]
+    neighbour, unknown = line.join(None, "10.0.0.8"), line.join(None, "")
+    assert neighbour.admitted and unknown.admitted  # before the third
+    line.leave(first)
+    assert third.admitted
+
+
+async def test_who_has_his_share_may_still_wait():
+    held = Counter({"10.0.0.7": 2})
+    line = WaitingLine(lambda: 2, has_share=has_half(held))
+    waiting = [line.join(None, "10.0.0.7") for _ in range(MOST_WAITING // 2)]
+    assert not any(ticket.admitted for ticket in waiting)
+    with pytest.raises(FullError):
+        line.join(None, "10.0.0.7")
+    assert line.join(None, "10.0.0.8").admitted

@@ -1,5 +1,6 @@
 """Other sites' pages: who may load what, with which tokens, and that nobody else may."""
 
+import re
 from dataclasses import replace
 from urllib.parse import quote
 
@@ -11,7 +12,7 @@ from starlette.responses import PlainTextResponse
 
 from ico3d.chat.serving import tokens
 from ico3d.chat.serving.guard import Guard
-from ico3d.chat.serving.sites import Sites, open_sites
+from ico3d.chat.serving.sites import Sites, open_sites, own_key, shown_key
 from ico3d.chat.settings.embedding import Embedding
 from ico3d.chat.wire.protocol import Answer, End, Error, Say
 from ico3d.cli import main
@@ -211,3 +212,54 @@ async def test_texts_are_not_said_elsewhere(typed):
     _, error = await page.wait(Error)
     assert not error.fatal and "settings do not allow" in error.message
     await page.close()
+
+
+async def test_keys_are_not_guessed(bundle):
+    machine, other = ({"X-Forwarded-For": f"203.0.113.{number}"} for number in (7, 8))
+    right = {"Authorization": f"Bearer {KEY}"}
+    proxied = serving(bundle, TYPED, sites=Sites(key=KEY), proxies=["127.0.0.1"])
+    async with proxied as (url, _), httpx.AsyncClient() as client:
+
+        async def status(*headers):
+            sent = {name: value for part in headers for name, value in part.items()}
+            return (await client.post(f"{url}token", headers=sent)).status_code
+
+        assert [await status(machine) for _ in range(11)] == 10 * [401] + [429]
+        assert await status(machine, right) == 429  # or guessing would go on
+        assert await status(other) == 401 and await status(other, right) == 200
+
+
+async def test_nobody_says_where_he_comes_from_but_a_proxy_that_was_named(bundle):
+    async with (
+        serving(bundle, TYPED, sites=Sites(key=KEY), proxies=["203.0.113.0/24"]) as (url, _),
+        httpx.AsyncClient(headers={"X-Forwarded-For": "198.51.100.7"}) as client,
+    ):
+        asked = [await client.post(f"{url}token") for _ in range(12)]
+    assert {answer.status_code for answer in asked} == {401}  # this machine's, uncounted
+
+
+def test_own_keys_are_long_and_can_be_read_aloud():
+    keys = {own_key() for _ in range(100)}
+    assert len(keys) == 100
+    assert all(re.fullmatch(r"[a-z2-7]{4}(-[a-z2-7]{4}){3}", key) for key in keys)
+
+
+@pytest.mark.parametrize(
+    ("is_public", "is_open", "variable", "shown"),
+    [
+        (False, False, "", None),
+        (False, True, "", None),
+        (True, True, "", None),
+        (False, False, "KEY", ""),
+        (True, False, "KEY", ""),
+    ],
+)
+def test_a_key_is_shown_where_the_operator_has_none(is_public, is_open, variable, shown):
+    assert shown_key(is_public, is_open, Embedding(key_variable=variable)) == shown
+    made = shown_key(True, False, Embedding())
+    assert made is not None and len(made) == 19 and open_sites(Embedding(), made).is_key(made)
+
+
+def test_everybody_and_only_those_with_a_key_is_a_contradiction():
+    with pytest.raises(SettingsError, match="leave out one of them"):
+        shown_key(True, True, Embedding(key_variable="KEY"))

@@ -24,9 +24,9 @@ class Guest:
         self._tasks = [asyncio.create_task(job) for job in (self._read(), self._play())]
 
     @classmethod
-    async def enter(cls, sessions, hello=None):
+    async def enter(cls, sessions, hello=None, ticket=None):
         outbox, hello = Outbox(), hello or Hello(VERSION, None, -1)
-        session, resumed = await sessions.enter(hello, outbox, sessions.line_up(hello))
+        session, resumed = await sessions.enter(hello, outbox, ticket or sessions.line_up(hello))
         if not resumed:
             await session.conversation.greet()
         return cls(sessions, session, outbox)
@@ -50,9 +50,9 @@ class Guest:
             (at, message) for at, message in self.log if isinstance(message, kind) and at > since
         ]
 
-    async def leave(self):
-        """The connection drops."""
-        self._sessions.leave(self.session, self._outbox)
+    async def leave(self, for_good=False):
+        """The connection drops, or is closed."""
+        self._sessions.leave(self.session, self._outbox, for_good)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

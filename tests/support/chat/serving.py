@@ -29,6 +29,7 @@ async def serving(
     adapt=lambda avatar: avatar,
     certificate=None,
     sites=None,
+    proxies=(),
 ):
     """Yields the URL and the sessions of a running server; by default the offline one.
 
@@ -40,7 +41,7 @@ async def serving(
         avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
         sessions = Sessions(avatar, resume_seconds)
     app = server.make_app(bundle, avatar, "127.0.0.1", sessions, sites)
-    running = server.make_server(app, certificate, sessions=sessions)
+    running = server.make_server(app, certificate, proxies, sessions)
     task = asyncio.create_task(running.serve(sockets=[listener]))
     while not running.started:
         await asyncio.sleep(0.01)

@@ -45,6 +45,11 @@ test('axe finds nothing serious in any state of the page', async () => {
   await judge(page, 'settings');
   await page.click('#panel-button');
   expect(await page.isHidden('#settings')).toBe(true); // there is room for one
+  await page.click('#ai-button');
+  expect(await page.isHidden('#panel')).toBe(true);
+  expect(await page.textContent('#origin dl')).toContain('nobody: this person does not exist');
+  await judge(page, 'origin');
+  await page.keyboard.press('Escape');
   await page.click('#drawer-button');
   await judge(page, 'drawer');
   await page.click('#drawer-close');

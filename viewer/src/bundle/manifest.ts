@@ -70,6 +70,17 @@ export interface SkinnedInfo {
   num_rest: number; // of the Gaussians, in a file of their own
 }
 
+/** Whose likeness the avatar is, who agreed, who made it of what; older bundles lack the optional entries. */
+export interface Provenance {
+  kind: string; // of the recordings
+  sources: string[];
+  consent: string;
+  licence: string;
+  likeness?: string;
+  made_by?: string;
+  made_on?: string; // a day such as 2026-11-24
+}
+
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
 export interface Manifest {
   name: string;
@@ -80,6 +91,7 @@ export interface Manifest {
   camera: StartCamera;
   background: [number, number, number];
   persona: { name: string; greeting: string; languages?: readonly string[] };
+  provenance: Provenance;
 }
 
 const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers of a texture
@@ -109,7 +121,23 @@ export function checkManifest(value: unknown): Manifest {
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
+  checkProvenance(manifest.provenance);
   return { ...manifest, head, body, skinned };
+}
+
+/** Texts go onto the page. */
+function checkProvenance(provenance: Provenance): void {
+  for (const key of ['kind', 'consent', 'licence'] as const) if (typeof provenance?.[key] !== 'string') bad(`provenance.${key}`);
+  const { sources } = provenance;
+  if (!Array.isArray(sources) || !sources.every((source) => typeof source === 'string')) bad('provenance.sources');
+  for (const key of ['likeness', 'made_by', 'made_on'] as const) {
+    if (!['string', 'undefined'].includes(typeof provenance[key])) bad(`provenance.${key}`);
+  }
+}
+
+/** Whether the avatar is nobody's likeness. */
+export function isSynthetic({ kind }: Provenance): boolean {
+  return kind === 'synthetic';
 }
 
 function withDefaults(info: SkinnedInfo): SkinnedInfo {

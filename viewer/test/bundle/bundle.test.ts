@@ -34,6 +34,14 @@ describe('a bundle that Python wrote', () => {
     }
   });
 
+  test('its provenance is text, and what older bundles do not state may lack', () => {
+    const written = JSON.parse(read('manifest.json').toString());
+    expect(checkManifest(written).provenance).toMatchObject({ consent: 'none needed' });
+    for (const wrong of [null, { ...written.provenance, likeness: 3 }, { ...written.provenance, sources: 'me.mp4' }]) {
+      expect(() => checkManifest({ ...written, provenance: wrong })).toThrow(/manifest\.json: provenance\.\w+ is missing or not/);
+    }
+  });
+
   test('eyelids lie behind the five brow values', () => {
     expect(blinkIndices(info)).toEqual([37, 38]);
     const named = { ...info, eye_offset: null, expression_names: ['jawOpen', 'eyeBlinkRight', 'eyeBlinkLeft'] };

@@ -55,6 +55,8 @@ class Render:
         size: Width and height in pixels, even numbers; one number for a square.
         background: Colour behind the person, as in HTML: a name or #rrggbb; by default the
             bundle's own, the mean background of the capture, or a light grey.
+        ai_mark: Burn "AI" into a corner of the pictures; without it, say otherwise that a machine
+            made them.
         seed: Seed of blinks and gestures.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
@@ -70,6 +72,7 @@ class Render:
     fps: float = 30.0
     size: Annotated[tuple[int, ...], tyro.conf.arg(metavar="W [H]")] = (540, 960)
     background: str | None = None
+    ai_mark: bool = True
     seed: int = 0
     device: DeviceName = "auto"
 
@@ -86,6 +89,7 @@ class Render:
         from rich.progress import track
 
         from ico3d.avatar.film.film import pictures
+        from ico3d.avatar.film.mark import marked
         from ico3d.avatar.film.video import write_video
         from ico3d.splat.device import computing_device
 
@@ -99,6 +103,8 @@ class Render:
         cameras = self._cameras(person, actor, max(1, round(seconds * self.fps)))
         backdrop = None if actor is None else actor.backdrop
         seen: Iterable = pictures(person, cameras, self.fps, background, backdrop, device)
+        if self.ai_mark:
+            seen = marked(seen, self._sides)
         shown = track(seen, "filming", len(cameras), transient=True)
         write_video(self.out, shown, self._sides, self.fps, sound)
         Console().print(f"{self.out}: {len(cameras)} pictures at {self.fps:g} per second.")

@@ -44,11 +44,12 @@ class FaceReader:
     without one.
     """
 
-    def __init__(self, model: Path):
+    def __init__(self, model: Path, most: int = 1):
         """Loads the model.
 
         Args:
             model: Path of `face_landmarker.task`.
+            most: Number of faces that are looked for in a picture.
 
         Raises:
             MissingExtraError: If MediaPipe is not installed.
@@ -63,6 +64,7 @@ class FaceReader:
         options = vision.FaceLandmarkerOptions(
             base_options=BaseOptions(model_asset_path=str(model)),
             running_mode=vision.RunningMode.IMAGE,
+            num_faces=most,
             output_face_blendshapes=True,
             output_facial_transformation_matrixes=True,
         )
@@ -88,20 +90,30 @@ class FaceReader:
         Returns:
             The face, or None.
         """
-        height, width = image.shape[:2]
+        found = self.faces(image)
+        return found[0] if found else None
+
+    def faces(self, image: np.ndarray) -> list[Face]:
+        """As many faces of a picture, uint8 RGB (H, W, 3), as are looked for."""
         packed = self._mediapipe.Image(
             image_format=self._mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image)
         )
         found = self._landmarker.detect(packed)
-        if not found.face_landmarks:
-            return None
-        self.names = tuple(shape.category_name for shape in found.face_blendshapes[0])
-        return Face(
-            np.array([(p.x * width, p.y * height) for p in found.face_landmarks[0]]),
-            np.array([shape.score for shape in found.face_blendshapes[0]], np.float32),
-            np.asarray(found.facial_transformation_matrixes[0], np.float64),
-            np.array([p.z * width for p in found.face_landmarks[0]]),
-        )
+        if found.face_blendshapes:
+            self.names = tuple(shape.category_name for shape in found.face_blendshapes[0])
+        parts = (found.face_landmarks, found.face_blendshapes, found.facial_transformation_matrixes)
+        return [_face(image, *one) for one in zip(*parts, strict=True)]
+
+
+def _face(image: np.ndarray, points: Any, shapes: Any, pose: Any) -> Face:
+    """A face as MediaPipe tells it."""
+    height, width = image.shape[:2]
+    return Face(
+        np.array([(p.x * width, p.y * height) for p in points]),
+        np.array([shape.score for shape in shapes], np.float32),
+        np.asarray(pose, np.float64),
+        np.array([p.z * width for p in points]),
+    )
 
 
 @dataclass(frozen=True)

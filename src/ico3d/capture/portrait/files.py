@@ -81,3 +81,9 @@ def save_torso(path: Path, image: np.ndarray, torso: np.ndarray) -> None:
     """
     alpha = (torso * 255).round().astype(np.uint8)[..., None]
     save_picture(path, np.concatenate([image * (alpha > 0), alpha], -1))
+
+
+def load_uint8(path: Path) -> np.ndarray:
+    """A picture as uint8."""
+    with Image.open(path) as picture:
+        return np.asarray(picture)

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from rich.console import Console
-from rich.progress import track as progress
 from torch import Tensor, nn
 
+from ico3d.capture.portrait.settings import POSES
+from ico3d.capture.progress import Reached, tracked
 from ico3d.common.camera import Camera
 from ico3d.common.device import DeviceName
 from ico3d.splat.device import computing_device
@@ -120,6 +121,7 @@ def refine_poses(
     look: Callable[[int], Look],
     device: DeviceName = "auto",
     seed: int = 0,
+    reached: Reached | None = None,
 ) -> Refined:
     """Corrects poses so that they agree with the pictures.
 
@@ -131,6 +133,7 @@ def refine_poses(
         look: Returns the picture of a pose, given the pose's index.
         device: Where to compute.
         seed: Seed of the order of pictures and the choice of points.
+        reached: Told about progress.
 
     Returns:
         Corrected poses in the same canonical space; the common part of all corrections is removed.
@@ -139,10 +142,10 @@ def refine_poses(
     place = computing_device(device)
     cloud = Cloud(points, len(poses), rng).to(place)
     behind = torch.from_numpy(background).to(place)
-    steps = int(np.clip(VISITS * len(poses), *STEPS))
+    steps = steps_for(len(poses))
     fit = _Fit(cloud, steps)
     order = np.concatenate([rng.permutation(len(poses)) for _ in range(-(-steps // len(poses)))])
-    for step in progress(range(steps), "refining the poses", console=console):
+    for step in tracked(range(steps), POSES, steps, console, reached):
         frame = int(order[step])
         seen = look(frame)
         image, head = (torch.from_numpy(part).to(place) for part in (seen.image, seen.head))
@@ -150,6 +153,11 @@ def refine_poses(
         explained = image + head[..., None] * (picture - image)  # (H, W, 3)
         fit.update(photometric(explained[None], image[None]), step)
     return _refined(poses, cloud.corrections.weight.detach().cpu().double())
+
+
+def steps_for(frames: int) -> int:
+    """Number of steps by which the poses of so many frames are corrected."""
+    return int(np.clip(VISITS * frames, *STEPS))
 
 
 class _Fit:

@@ -48,14 +48,13 @@ def align(track: Track, rigid: np.ndarray, load: Callable[[int], np.ndarray]) ->
     """Refines the poses of a track so that they agree with the pictures.
 
     Args:
-        track: Shape, focal length and poses from landmarks.
+        track: Shape, focal length and poses from landmarks, `smoothed`.
         rigid: (K,) bool: landmarks that do not move with the expression.
         load: Returns the grey picture (H, W) uint8 of a frame, given its index in the track.
 
     Returns:
         The track with refined poses; shape and focal length are unchanged.
     """
-    track = replace(track, rotations=_smooth(track.rotations))
     references = [Reference(i, load(i)) for i in spread_poses(track, REFERENCES)]
     part = replace(track, shape=track.shape[rigid], sigmas=np.ones(int(rigid.sum())))
     for _ in range(ROUNDS):
@@ -63,6 +62,11 @@ def align(track: Track, rigid: np.ndarray, load: Callable[[int], np.ndarray]) ->
         weighted = replace(part, sigmas=_spreads(part, found))
         part = rigid_head.place(weighted, found, part.poses(), rigid_head.IN_PLANE)
     return replace(track, rotations=part.rotations, translations=part.translations)
+
+
+def smoothed(track: Track) -> Track:
+    """The track through consecutive frames without the landmarks' jitter of rotations."""
+    return replace(track, rotations=_smooth(track.rotations))
 
 
 def _smooth(rotations: np.ndarray) -> np.ndarray:

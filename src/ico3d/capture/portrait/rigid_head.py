@@ -6,6 +6,7 @@ are recognised by their residuals and weighted down. Camera axes are OpenGL's (x
 looks along -z), as in the talking-portrait layout.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,6 +62,13 @@ class Track:
         poses = np.tile(np.eye(4), (len(self.rotations), 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = self.rotations, self.translations
         return poses
+
+    def part(self, chosen: Sequence[int]) -> "Track":
+        """The track through some of its frames."""
+        places = np.asarray(chosen)
+        return replace(
+            self, rotations=self.rotations[places], translations=self.translations[places]
+        )
 
 
 def fit(

@@ -53,7 +53,7 @@ def chosen(table: Table, choice: Choice, kind: str) -> ChosenService:
     provider = table.get(choice.use)
     if provider is None:
         names = " or ".join((*table, BEST))
-        raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
+        raise SettingsError(f"chat settings: {kind} '{choice.use[:80]}' is unknown, use {names}.")
     where = f"chat settings: {kind} '{choice.use}'"
     return ChosenService(provider, filled(provider.settings, choice.options, where))
 

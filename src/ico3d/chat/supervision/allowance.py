@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from pipecat.frames.frames import LLMContextFrame
 from pipecat.observers.base_observer import BaseObserver, FramePushed
-from pipecat.processors.frame_processor import FrameDirection
+from pipecat.processors.aggregators.llm_response_universal import LLMUserAggregator
 
 
 class Bucket:
@@ -63,5 +63,5 @@ class Allowance(BaseObserver):
 
     async def on_push_frame(self, data: FramePushed):
         """Counts questions, also those prepared before the visitor has finished."""
-        if isinstance(data.frame, LLMContextFrame) and data.direction == FrameDirection.DOWNSTREAM:
+        if isinstance(data.frame, LLMContextFrame) and isinstance(data.source, LLMUserAggregator):
             self.spend()

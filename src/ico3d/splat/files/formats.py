@@ -47,9 +47,9 @@ def read_file(path: Path | str) -> GaussianFile:
         named, gaussians = _read(kind, data)
         return GaussianFile(named, gaussians.checked())
     except OSError as error:
-        raise GaussianFileError(f"{path}: cannot be read ({error.strerror})") from None
+        raise GaussianFileError(f"{path}: cannot be read ({error.strerror}).") from None
     except GaussianFileError as error:
-        raise GaussianFileError(f"{path}: {error}") from None
+        raise GaussianFileError(f"{path}: {error}.") from None
 
 
 def _recognise(head: bytes, path: Path) -> str:
@@ -104,4 +104,4 @@ def write_gaussians(path: Path | str, gaussians: RawGaussians) -> None:
     try:
         write_atomic(path, lambda temporary: write(gaussians, temporary))
     except OSError as error:
-        raise GaussianFileError(f"{path}: cannot be written ({error.strerror})") from None
+        raise GaussianFileError(f"{path}: cannot be written ({error.strerror}).") from None

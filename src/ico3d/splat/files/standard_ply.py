@@ -27,7 +27,9 @@ def read(table: NDArray[Any]) -> RawGaussians:
     if rest not in _DEGREES or not set(rest_properties(_DEGREES[rest])) <= set(present):
         raise GaussianFileError(f"{rest} properties f_rest_*: expected f_rest_0 to 8, 23 or 44")
     fields = {
-        field: columns(table, names) for field, names in PROPERTIES.items() if names[0] in present
+        field: columns(table, names)
+        for field, names in PROPERTIES.items()
+        if set(names) <= set(present)
     }
     channels = columns(table, rest_properties(_DEGREES[rest]))  # (N, 3·(K - 1))
     return RawGaussians(

@@ -40,8 +40,9 @@ export class Disclosure {
 
   /** There is room for one of the parts that lie side by side. */
   private closeOthers(): void {
-    for (const button of this.button.parentElement!.querySelectorAll<HTMLElement>('[aria-expanded=true]')) {
-      const beside = this.part.parentElement!.querySelector(`:scope > #${button.getAttribute('aria-controls')}`);
+    const header = this.part.closest('header');
+    for (const button of header?.querySelectorAll<HTMLElement>('[aria-expanded=true]') ?? []) {
+      const beside = header!.querySelector(`#${button.getAttribute('aria-controls')}`);
       if (beside && button !== this.button) button.click();
     }
   }

@@ -1,6 +1,7 @@
 """Reads points of a body and of a hand in pictures with MediaPipe."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,36 +62,19 @@ class BodyReader:
             MissingExtraError: If MediaPipe is not installed.
             CaptureError: If a model file cannot be used.
         """
-        try:
-            import mediapipe
-            from mediapipe.tasks.python import BaseOptions, vision
-        except ImportError as error:
-            raise MissingExtraError("mediapipe", "face", PURPOSE) from error
-        self._mediapipe = mediapipe
-        still = vision.RunningMode.IMAGE
+        self._mediapipe, vision, base = _imported(body_model)
         self._bodies = _opened(
             body_model,
             lambda: vision.PoseLandmarker.create_from_options(
                 vision.PoseLandmarkerOptions(
-                    base_options=BaseOptions(model_asset_path=str(body_model)),
-                    running_mode=still,
+                    base_options=base,
+                    running_mode=vision.RunningMode.IMAGE,
                     min_pose_detection_confidence=LEAST_CONFIDENCE,
                     min_pose_presence_confidence=LEAST_CONFIDENCE,
                 )
             ),
         )
-        self._hands = _opened(
-            hand_model,
-            lambda: vision.HandLandmarker.create_from_options(
-                vision.HandLandmarkerOptions(
-                    base_options=BaseOptions(model_asset_path=str(hand_model)),
-                    running_mode=still,
-                    num_hands=1,
-                    min_hand_detection_confidence=LEAST_CONFIDENCE,
-                    min_hand_presence_confidence=LEAST_CONFIDENCE,
-                )
-            ),
-        )
+        self._hands = HandReader(hand_model)
 
     def close(self) -> None:
         """Closes the models."""
@@ -99,7 +83,7 @@ class BodyReader:
 
     def body(self, picture: np.ndarray) -> Body | None:
         """The person in a picture, uint8 RGB (H, W, 3); None where there is none."""
-        found = self._bodies.detect(self._packed(picture))
+        found = self._bodies.detect(_packed(self._mediapipe, picture))
         if not found.pose_landmarks:
             return None
         seen, space = found.pose_landmarks[0], found.pose_world_landmarks[0]
@@ -111,16 +95,68 @@ class BodyReader:
 
     def hand(self, picture: np.ndarray) -> Hand | None:
         """The hand in a picture, uint8 RGB (H, W, 3); None where there is none."""
-        found = self._hands.detect(self._packed(picture))
-        if not found.hand_landmarks:
-            return None
-        side = found.handedness[0][0]
-        left = side.category_name == "Left"
-        return Hand(_pixels(found.hand_landmarks[0], picture), left, float(side.score))
+        return next(iter(self._hands.hands(picture)), None)
 
-    def _packed(self, picture: np.ndarray) -> Any:
-        form = self._mediapipe.ImageFormat.SRGB
-        return self._mediapipe.Image(image_format=form, data=np.ascontiguousarray(picture))
+
+class HandReader:
+    """Finds hands in a picture, independently of other pictures."""
+
+    def __init__(self, model: Path, most: int = 1, confidence: float = LEAST_CONFIDENCE):
+        """Loads the model.
+
+        Args:
+            model: `hand_landmarker.task`.
+            most: Number of hands that are looked for in a picture.
+            confidence: Least confidence of a detection, 0 to 1.
+
+        Raises:
+            MissingExtraError: If MediaPipe is not installed.
+            CaptureError: If the model file cannot be used.
+        """
+        self._used = False
+        self._mediapipe, vision, base = _imported(model)
+        self._hands = _opened(
+            model,
+            lambda: vision.HandLandmarker.create_from_options(
+                vision.HandLandmarkerOptions(
+                    base_options=base,
+                    running_mode=vision.RunningMode.IMAGE,
+                    num_hands=most,
+                    min_hand_detection_confidence=confidence,
+                    min_hand_presence_confidence=confidence,
+                )
+            ),
+        )
+
+    def close(self) -> None:
+        """Closes the model."""
+        self._hands.close()
+
+    def hands(self, picture: np.ndarray) -> list[Hand]:
+        """As many hands of a picture, uint8 RGB (H, W, 3), as are looked for."""
+        with nullcontext() if self._used else held_back():  # what the first one says of pictures
+            found = self._hands.detect(_packed(self._mediapipe, picture))
+        self._used = True
+        return [
+            Hand(_pixels(points, picture), sides[0].category_name == "Left", float(sides[0].score))
+            for points, sides in zip(found.hand_landmarks, found.handedness, strict=True)
+        ]
+
+
+def _imported(model: Path) -> tuple[Any, Any, Any]:
+    """MediaPipe, its tasks for pictures, and the options that name a model."""
+    try:
+        import mediapipe
+        from mediapipe.tasks.python import BaseOptions, vision
+    except ImportError as error:
+        raise MissingExtraError("mediapipe", "face", PURPOSE) from error
+    return mediapipe, vision, BaseOptions(model_asset_path=str(model))
+
+
+def _packed(mediapipe: Any, picture: np.ndarray) -> Any:
+    """A picture as MediaPipe takes it."""
+    form = mediapipe.ImageFormat.SRGB
+    return mediapipe.Image(image_format=form, data=np.ascontiguousarray(picture))
 
 
 def _opened(model: Path, load: Callable[[], Any]) -> Any:

@@ -47,12 +47,11 @@ class PromptProtocol(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Takes bytes, unless they make a head too large."""
-        if self._deadline is not None:
+        super().data_received(data)
+        if self._deadline is not None:  # the head has not ended; else a body may have come with it
             self._head_bytes += len(data)
             if self._head_bytes > LARGEST_HEAD:
                 self.transport.abort()
-                return
-        super().data_received(data)
 
     def on_headers_complete(self) -> None:
         """The head of a request has arrived."""

@@ -1,0 +1,1 @@
+"""From one video to an avatar: what the verbs do one by one, in one go."""

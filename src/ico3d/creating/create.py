@@ -1,0 +1,165 @@
+"""Makes an avatar of a video: looks at it, tracks, learns, measures, bakes."""
+
+import json
+import time
+from functools import partial
+from pathlib import Path
+
+from ico3d.avatar.baking.command import Bake
+from ico3d.bundle.persona import Persona, read_persona
+from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
+from ico3d.capture.portrait.settings import CUTOUTS, FACES, POSES, PortraitSettings
+from ico3d.capture.portrait.track import track_portrait
+from ico3d.common.files import full_disk, write_atomic
+from ico3d.common.typed import plain
+from ico3d.creating.events import Advanced, Looked, Made, Measured, Planned, Step, Tell
+from ico3d.creating.learning import learn
+from ico3d.creating.looking.examine import Examination, examine
+from ico3d.creating.measuring import measured
+from ico3d.creating.pace import set_pace
+from ico3d.creating.plan import check_room, expected
+from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
+from ico3d.creating.workplace import Workplace, workplace
+from ico3d.errors import CaptureError
+from ico3d.head.model_folder import TrainedHead
+
+SIZE = 512
+"""Upper limit of the pictures' short side in pixels."""
+TRACKED = {FACES: (0.0, 0.1), CUTOUTS: (0.1, 0.3), POSES: (0.3, 1.0)}
+"""Which share of tracking each of its steps begins and ends with."""
+QUALITY, STRIP = "quality.json", "strip.png"
+
+
+def create(settings: CreateSettings, tell: Tell) -> Made:
+    """Makes an avatar of a video; called again with the same settings it goes on where it stopped.
+
+    What it makes on the way lies in NAME.work beside the avatar, so that a better quality begins
+    with the video tracked already. The avatar appears, or replaces an earlier one, once it is
+    complete.
+
+    Args:
+        settings: The video, the avatar, and how well it is to be made.
+        tell: Told what happens, on the thread that calls.
+
+    Returns:
+        The avatar, and how good it is.
+
+    Raises:
+        CaptureError: If no avatar can be made of the video; the sentence says why.
+        SettingsError: If the avatar's name or the folder belongs to something else.
+        StorageError: If the disk is full, or cannot be written.
+        MissingModelError: If the face model is not installed.
+        Ico3dError: As for the verbs that track, train and bake.
+    """
+    begin = time.monotonic()
+    persona = _persona(settings)
+    with workplace(settings) as place, full_disk(place.folder):
+        if place.is_done(settings):
+            return _made(settings, place, begin, tell)
+        quality = QUALITIES[settings.quality]
+        found = _looked(settings, tell)
+        check_room(place.folder, quality, found)
+        tell(_planned(settings, place, found))
+        capture = _tracked(settings, place, quality, tell)
+        set_pace(settings.device)  # other programs may have come or gone
+        head = learn(capture, place.head(settings.quality), settings, quality, tell)
+        _measure(head, capture, place, settings, tell)
+        _bake(settings, place, capture.path, persona, tell)
+        place.note_done(settings)
+        return _made(settings, place, begin, tell)
+
+
+def _persona(settings: CreateSettings) -> Persona:
+    """The persona that is asked for, or one that knows its name alone."""
+    if settings.persona is not None:
+        return read_persona(settings.persona)
+    name = settings.out.stem
+    return Persona(name, f"Hello, I am {name}.", (f"who are you | your name => I am {name}.",))
+
+
+def _looked(settings: CreateSettings, tell: Tell) -> Examination:
+    """Examines the video.
+
+    Raises:
+        CaptureError: If no avatar can be made of it.
+    """
+    reached = partial(_tell_share, tell, "look", "looking at the video")
+    found = examine(settings.video, SIZE, reached)
+    tell(Looked(settings.video, found))
+    if found.refused:
+        reasons = " ".join(str(one) for one in found.refused)
+        raise CaptureError(f"{settings.video}: {reasons}")
+    return found
+
+
+def _tell_share(tell: Tell, step: Step, doing: str, share: float) -> None:
+    tell(Advanced(step, share, doing))
+
+
+def _planned(settings: CreateSettings, place: Workplace, found: Examination) -> Planned:
+    """How long everything takes at each quality, and what is left of the one that is wanted."""
+    step = set_pace(settings.device)
+    plans = {name: expected(quality, found, step) for name, quality in QUALITIES.items()}
+    left = dict(plans[settings.quality])
+    if place.capture(QUALITIES[settings.quality].tracking).exists():
+        left["track"] = 0.0
+    if (place.head(settings.quality) / "finished.json").exists():
+        left["learn"] = 0.0
+    return Planned(left, {name: sum(plan.values()) for name, plan in plans.items()})
+
+
+def _tracked(settings: CreateSettings, place: Workplace, quality: Quality, tell: Tell) -> Capture:
+    """The tracked video."""
+    folder = place.capture(quality.tracking)
+    if not folder.exists():
+
+        def reached(doing: str, share: float) -> None:
+            begin, end = TRACKED[doing]
+            tell(Advanced("track", begin + share * (end - begin), doing))
+
+        stated = (settings.out.stem, settings.consent, settings.licence)
+        about = (*stated, settings.device, quality.pictures)
+        how = PortraitSettings(SIZE, None, quality.refine, *about)
+        track_portrait(settings.video, folder, how, reached)
+    tell(Advanced("track", 1.0, "tracked"))
+    return open_capture(folder)
+
+
+def _measure(
+    head: TrainedHead, capture: Capture, place: Workplace, settings: CreateSettings, tell: Tell
+) -> None:
+    """Measures the head and notes the result."""
+    reached = partial(_tell_share, tell, "measure", "comparing with pictures it never saw")
+    place.write(f"{settings.quality}-{QUALITY}", plain(measured(head, capture, reached)))
+
+
+def _bake(
+    settings: CreateSettings, place: Workplace, capture: Path, persona: Persona, tell: Tell
+) -> None:
+    """Writes the avatar.
+
+    It is written even where baking costs more than `ico3d bake` allows, since that is told and
+    there is nothing else to have of a short video.
+    """
+    tell(Advanced("bake", 0.0, "making the avatar's file"))
+    about = place.file("persona.json")
+    write_atomic(about, json.dumps(plain(persona), indent=1).encode())
+    Bake(
+        place.head(settings.quality),
+        (capture, settings.out),
+        persona=about,
+        strip=place.file(STRIP),
+        force=True,
+        device=settings.device,
+    ).run()
+    tell(Advanced("bake", 1.0, "made"))
+
+
+def _made(settings: CreateSettings, place: Workplace, begin: float, tell: Tell) -> Made:
+    """Tells that the avatar is there."""
+    known = place.read(f"{settings.quality}-{QUALITY}") or {}
+    quality = Measured(known.get("face"), known.get("mouth"), known.get("pictures", 0))
+    made = Made(settings.out, place.file(STRIP), quality, time.monotonic() - begin)
+    tell(made)
+    return made

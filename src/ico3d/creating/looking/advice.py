@@ -1,0 +1,70 @@
+"""What is wrong with a video, in words for the person who filmed it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Topic = Literal[
+    "file",
+    "length",
+    "face",
+    "faces",
+    "frame",
+    "distance",
+    "light",
+    "exposure",
+    "blur",
+    "hands",
+    "turns",
+    "lips",
+    "camera",
+    "rate",
+    "sound",
+]
+Level = Literal["refused", "better"]
+"""Whether nothing can be made of the video, or something better could."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """One thing that would make a video better.
+
+    Attributes:
+        topic: What it is about.
+        level: `refused` if nothing can be made of the video as it is.
+        text: What is wrong and what helps, in plain words.
+        spans: Seconds (first, last) where it is so; none where it is so all along.
+    """
+
+    topic: Topic
+    level: Level
+    text: str
+    spans: tuple[tuple[float, float], ...] = ()
+
+    def __str__(self) -> str:
+        """The text with the seconds before it."""
+        return f"{when(self.spans)}: {self.text}" if self.spans else self.text
+
+
+def spans_of(seconds: Sequence[float], apart: float) -> tuple[tuple[float, float], ...]:
+    """Moments as spans: those that lie no farther than `apart` from each other are one."""
+    spans: list[tuple[float, float]] = []
+    for second in sorted(seconds):
+        if spans and second - spans[-1][1] <= apart:
+            spans[-1] = (spans[-1][0], second)
+        else:
+            spans.append((second, second))
+    return tuple(spans)
+
+
+def when(spans: Sequence[tuple[float, float]], most: int = 4) -> str:
+    """Spans in words: "at 3 s and 7 to 9 s"; of many the first ones."""
+    shown = [_span(*span) for span in spans[:most]]
+    if len(spans) > most:
+        return f"at {', '.join(shown)} and {len(spans) - most} more times"
+    return "at " + " and ".join(filter(None, [", ".join(shown[:-1]), shown[-1]]))
+
+
+def _span(first: float, last: float) -> str:
+    begin, end = round(first), round(last)
+    return f"{begin} s" if begin == end else f"{begin} to {end} s"

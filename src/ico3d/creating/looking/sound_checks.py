@@ -1,0 +1,61 @@
+"""What the sound of a video tells: absent, silent, clipped, quiet, noisy."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ico3d.capture.capture import Sound
+from ico3d.creating.looking.advice import Advice, spans_of
+
+WINDOW = 0.1
+"""Seconds of a piece of sound."""
+CLIPPED, IN_A_ROW = 0.985, 3
+"""Size of a sample, and number of such samples in a row, from which on a sound is cut off."""
+SILENT, QUIET = -55.0, -38.0
+"""Loudness of the louder tenth of the pieces, decibels of full scale, below which it is so."""
+ABOVE_NOISE = 15.0
+"""Decibels by which speech should be above what is heard between words."""
+
+
+def sound_advice(sound: Sound | None) -> Iterator[Advice]:
+    """What would make the sound better.
+
+    Args:
+        sound: The video's sound; None where it has none.
+    """
+    length = 0 if sound is None else round(WINDOW * sound.rate)
+    count = 0 if sound is None else len(sound.samples) // length
+    if sound is None or not count:
+        yield Advice("sound", "refused", (
+            "the video has no sound, by which an avatar learns how your lips follow your voice: "
+            "film again with the microphone on."
+        ))  # fmt: skip
+        return
+    pieces = sound.samples[: count * length].reshape(count, length)  # (P, n)
+    loudness = 20 * np.log10(np.sqrt((pieces.astype(np.float64) ** 2).mean(1)) + 1e-9)  # (P,)
+    loud, floor = np.quantile(loudness, [0.9, 0.1])
+    if loud < SILENT:
+        yield Advice("sound", "refused", (
+            "the sound is silent, and an avatar learns from it how your lips follow your voice: "
+            "switch the microphone on and film again."
+        ))  # fmt: skip
+        return
+    clipped = [WINDOW * (place + 0.5) for place in np.flatnonzero(_clips(pieces))]
+    if clipped:
+        text = "the sound is clipped: speak softer, or move away from the microphone."
+        yield Advice("sound", "better", text, spans_of(clipped, 1.0))
+    if loud < QUIET:
+        yield Advice("sound", "better", "the voice is quiet: speak up, or come closer.")
+    if loud - floor < ABOVE_NOISE:
+        yield Advice("sound", "better", (
+            "noise is nearly as loud as the voice, or there is no pause: find a quiet room, and "
+            "be silent for a moment between sentences."
+        ))  # fmt: skip
+
+
+def _clips(pieces: np.ndarray) -> np.ndarray:
+    """(P,) whether a piece has samples at the limit in a row."""
+    at_limit = np.abs(pieces) >= CLIPPED  # (P, n)
+    rows = at_limit.shape[1] - IN_A_ROW + 1
+    every = np.stack([at_limit[:, i : i + rows] for i in range(IN_A_ROW)]).all(0)
+    return every.any(1)

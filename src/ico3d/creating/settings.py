@@ -1,0 +1,70 @@
+"""What an avatar is made of, and how well."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from ico3d.common.device import DeviceName
+from ico3d.head.settings import PRESETS, HeadSettings
+
+QualityName = Literal["quick", "good", "best"]
+
+
+@dataclass(frozen=True)
+class CreateSettings:
+    """What an avatar is made of.
+
+    Attributes:
+        video: A video of one person who talks, by a phone or a webcam that stands still.
+        out: The avatar to write, NAME.ico3d; NAME is how it introduces itself.
+        quality: How long to work on it: times for this machine are told before it starts.
+        persona: TOML or JSON file that says who the avatar is; by default it knows its name alone.
+        consent: What the person agreed to; goes into the avatar's manifest.
+        licence: Licence of the recording; goes into the avatar's manifest.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
+    """
+
+    video: Annotated[Path, tyro.conf.Positional]
+    out: Annotated[Path, tyro.conf.Positional]
+    quality: QualityName = "good"
+    persona: Path | None = None
+    consent: str = "not stated"
+    licence: str = "not stated"
+    device: DeviceName = "auto"
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How much work goes into an avatar.
+
+    Attributes:
+        tracking: Name of the way the video is tracked; qualities that share it share its result.
+        pictures: Most pictures that are kept of the video.
+        refine: Whether poses are corrected by pictures of the whole head.
+        head: How the head is trained.
+    """
+
+    tracking: str
+    pictures: int
+    refine: bool
+    head: HeadSettings
+
+
+_CPU = PRESETS["cpu"]
+QUALITIES: dict[QualityName, Quality] = {
+    "quick": Quality(
+        "rough",
+        200,
+        False,
+        replace(
+            _CPU,
+            steps=600,
+            checkpoint_every=100,
+            density=replace(_CPU.density, begin=100, until=400),
+        ),
+    ),
+    "good": Quality("exact", 300, True, replace(_CPU, checkpoint_every=250)),
+    "best": Quality("exact", 300, True, replace(_CPU, steps=6_000, checkpoint_every=250)),
+}

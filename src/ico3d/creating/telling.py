@@ -1,0 +1,87 @@
+"""Tells on a terminal how far an avatar is."""
+
+from PIL import Image
+from rich.console import Console
+
+from ico3d.creating.events import STEPS, Event, Looked, Made, Planned, Preview
+from ico3d.creating.settings import CreateSettings
+
+NAMES = {
+    "look": "looking",
+    "track": "tracking",
+    "learn": "learning the face",
+    "measure": "measuring",
+    "bake": "baking",
+}
+
+
+class Terminal:
+    """Prints what `create` tells; progress bars are those of the steps themselves."""
+
+    def __init__(self, settings: CreateSettings):
+        """Takes what the avatar is made of."""
+        self._settings = settings
+        self._console = Console(highlight=False, soft_wrap=True)
+        self._face = settings.out.with_suffix(".work") / "face.jpg"
+
+    def __call__(self, event: Event) -> None:
+        """Prints an event, if it is for a terminal."""
+        lines: list[str] = []
+        if isinstance(event, Looked):
+            lines = _of_video(event)
+        elif isinstance(event, Planned):
+            lines = self._of_plan(event)
+        elif isinstance(event, Preview):
+            Image.fromarray(event.picture).save(self._face, quality=90)
+        elif isinstance(event, Made):
+            lines = _of_avatar(event)
+        for line in lines:
+            self._console.print(line, markup=False)
+
+    def _of_plan(self, plan: Planned) -> list[str]:
+        parts = [f"{NAMES[s]} {duration(plan.seconds[s])}" for s in STEPS if plan.seconds.get(s)]
+        total = duration(sum(plan.seconds.values()))
+        times = ", ".join(f"{name} {duration(seconds)}" for name, seconds in plan.others.items())
+        return [
+            f"Quality {self._settings.quality} takes about {total} from here: {', '.join(parts)}.",
+            f"On this machine as busy as it is now, all in all: {times} (--quality).",
+            f"{self._face} shows the face as it learns: recorded | learnt.",
+            "Interrupt whenever you like: the same command goes on.",
+        ]
+
+
+def _of_video(looked: Looked) -> list[str]:
+    found = looked.found
+    lines = [f"{looked.video}: {found.seconds:.0f} s, {found.rate:.0f} pictures per second."]
+    better = [one for one in found.advice if one.level == "better"]
+    if better:
+        lines.append("What would make the avatar better:")
+        lines += [f"  - {one}" for one in better]
+    elif not found.refused:
+        lines.append("Nothing about it needs to be better.")
+    if not found.hands_sought:
+        lines.append("  (hands were not looked for: ico3d weights fetch hand-landmarker)")
+    return lines
+
+
+def _of_avatar(made: Made) -> list[str]:
+    quality, lines = made.measured, []
+    if quality.face is not None:
+        mouth = "" if quality.mouth is None else f", {quality.mouth:.1f} dB at the mouth"
+        lines.append(
+            f"On {quality.pictures} pictures that it never saw: {quality.face:.1f} dB on face and "
+            f"hair{mouth}."
+        )
+    lines += [
+        f"{made.bundle} is there, after {duration(made.seconds)}. Look at {made.strip}: recorded | "
+        "learnt | as browsers show it.",
+        f"Talk with it: ico3d serve {made.bundle}",
+    ]
+    return lines
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words, rounded as estimates are."""
+    if seconds < 90:
+        return f"{max(5 * round(seconds / 5), 5)} s"
+    return f"{round(seconds / 60)} min"

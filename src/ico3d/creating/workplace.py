@@ -1,0 +1,135 @@
+"""The folder beside an avatar in which it is made, so that nothing is done twice."""
+
+import fcntl
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from ico3d.common.files import write_atomic
+from ico3d.creating.settings import CreateSettings, QualityName
+from ico3d.errors import SettingsError, StorageError
+
+ABOUT, DONE = "about.json", "done.json"
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where the steps leave what they made.
+
+    Attributes:
+        folder: The folder, NAME.work beside NAME.ico3d.
+        video: Hash of the video.
+    """
+
+    folder: Path
+    video: str
+
+    def capture(self, tracking: str) -> Path:
+        """The tracked video."""
+        return self.folder / f"capture-{tracking}"
+
+    def head(self, quality: QualityName) -> Path:
+        """The trained head."""
+        return self.folder / f"head-{quality}"
+
+    def file(self, name: str) -> Path:
+        """Another file."""
+        return self.folder / name
+
+    def is_done(self, settings: CreateSettings) -> bool:
+        """Whether the avatar is there as these settings want it."""
+        return settings.out.is_file() and self.read(DONE) == _wanted(settings, settings.out)
+
+    def note_done(self, settings: CreateSettings) -> None:
+        """Remembers that the avatar was written."""
+        self.write(DONE, _wanted(settings, settings.out))
+
+    def read(self, name: str) -> dict | None:
+        """A note that `write` left, or None."""
+        try:
+            return json.loads(self.file(name).read_text("utf-8"))
+        except (OSError, ValueError):
+            return None
+
+    def write(self, name: str, values: dict) -> None:
+        """Leaves a note."""
+        write_atomic(self.file(name), json.dumps(values, indent=1).encode())
+
+
+@contextmanager
+def workplace(settings: CreateSettings) -> Iterator[Workplace]:
+    """The workplace of an avatar, for one process at a time; what killed ones left is cleared away.
+
+    Raises:
+        SettingsError: If the avatar's name is no bundle's, if its file or folder belongs to
+            something else, or another process makes it just now.
+        StorageError: If the folder cannot be written.
+    """
+    out, folder = settings.out, settings.out.with_suffix(".work")
+    if out.suffix != ".ico3d":
+        raise SettingsError(f"{out} must end in .ico3d: that is the avatar's file.")
+    if out.exists() and not (folder / DONE).is_file():
+        raise SettingsError(f"{out} exists already: choose another name, or remove it.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "lock").open("w")
+    except OSError as error:
+        raise StorageError(f"{folder} cannot be written ({error.strerror}).") from error
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise SettingsError(f"{out} is being made just now, by another process.") from error
+        place = Workplace(folder, _digest(settings.video))
+        _check_same(place, settings)
+        for left in folder.glob(".capture-*"):
+            shutil.rmtree(left, ignore_errors=True)
+        yield place
+
+
+def _check_same(place: Workplace, settings: CreateSettings) -> None:
+    """A folder belongs to one recording, and to what its person agreed to."""
+    now = {
+        "video": settings.video.name,
+        "sha256": place.video,
+        "consent": settings.consent,
+        "licence": settings.licence,
+    }
+    before = place.read(ABOUT)
+    if before is None:
+        place.write(ABOUT, now)
+        return
+    different = [key for key in now if key != "video" and before.get(key) != now[key]]
+    if different:
+        what = {"sha256": "of another video"}.get(different[0], f"with another {different[0]}")
+        raise SettingsError(
+            f"{place.folder} holds an avatar {what} ({before.get('video')}): choose another name, "
+            "or remove that folder."
+        )
+
+
+def _wanted(settings: CreateSettings, bundle: Path) -> dict:
+    """What tells one avatar of a video from another."""
+    persona = settings.persona
+    return {
+        "quality": settings.quality,
+        "persona": None if persona is None else _digest(persona),
+        "bundle": _digest(bundle),
+    }
+
+
+def _digest(file: Path) -> str:
+    """SHA-256 of a file.
+
+    Raises:
+        SettingsError: If it cannot be read.
+    """
+    try:
+        with file.open("rb") as opened:
+            return hashlib.file_digest(opened, "sha256").hexdigest()
+    except OSError as error:
+        raise SettingsError(f"{file} cannot be read ({error.strerror}).") from error

@@ -1,0 +1,130 @@
+"""From a video to an avatar, with a recording of a few tiny pictures in the tracker's place."""
+
+from functools import partial
+
+import pytest
+
+from ico3d.avatar.baking import head_bundle
+from ico3d.avatar.baking.shader_head import BakeSettings
+from ico3d.bundle.format import Bundle
+from ico3d.cli import main
+from ico3d.creating import create as room
+from ico3d.creating import plan
+from ico3d.creating.create import create
+from ico3d.creating.events import STEPS, Advanced, Looked, Made, Planned, Preview
+from ico3d.creating.looking.advice import Advice
+from ico3d.creating.looking.examine import Examination
+from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
+from ico3d.errors import CaptureError, StorageError
+from ico3d.head.settings import Density, HeadSettings, Initial, Network
+from support.recordings.portrait_folder import write_folder
+
+pytestmark = pytest.mark.slow
+
+HEAD = HeadSettings(
+    steps=12,
+    checkpoint_every=4,
+    network=Network(features=4, hidden=8),
+    initial=Initial(200),
+    density=Density(max_gaussians=200),
+)
+FOUND = Examination(30.0, 25.0, (Advice("blur", "better", "blurred.", ((2, 3),)),), True)
+
+
+@pytest.fixture
+def tracked(monkeypatch):
+    """What was tracked, video by video."""
+    videos = []
+
+    def track(video, folder, how, reached):
+        videos.append((video.name, how.consent, how.refine))
+        for step in room.TRACKED:
+            reached(step, 0.5)
+        write_folder(folder)
+
+    monkeypatch.setattr(room, "track_portrait", track)
+    monkeypatch.setattr(room, "examine", lambda video, size, reached: FOUND)
+    monkeypatch.setattr(room, "set_pace", lambda device: 0.02)
+    quick = partial(BakeSettings, 32, augmented=20, steps=40)
+    monkeypatch.setattr(head_bundle, "BakeSettings", quick)
+    for name in QUALITIES:
+        monkeypatch.setitem(QUALITIES, name, Quality("exact", 22, True, HEAD))
+    return videos
+
+
+@pytest.fixture
+def settings(tmp_path):
+    (tmp_path / "ada.mp4").write_bytes(b"a video")
+    return CreateSettings(tmp_path / "ada.mp4", tmp_path / "ada.ico3d", consent="yes")
+
+
+def test_the_whole_way_and_again(tracked, settings, capfd):
+    told = []
+    made = create(settings, told.append)
+    assert tracked == [("ada.mp4", "yes", True)]
+    manifest = Bundle.open(settings.out).manifest
+    assert manifest.name == manifest.persona.name == "ada"
+    assert manifest.persona.greeting == "Hello, I am ada."
+    assert [type(event) for event in told[:2]] == [Looked, Planned] and told[-1] is made
+    assert told[1].others.keys() == QUALITIES.keys()
+    steps = [event.step for event in told if isinstance(event, Advanced)]
+    assert list(dict.fromkeys(steps)) == list(STEPS[1:])
+    shares = [e.share for e in told if isinstance(e, Advanced) and e.step == "learn"]
+    assert shares == [i / 12 for i in range(1, 13)]
+    faces = [event.picture for event in told if isinstance(event, Preview)]
+    assert len(faces) == 12 and faces[0].shape == (64, 128, 3)
+    assert made.measured.pictures == 2 and 0 < made.measured.face < 60
+    assert made.strip.is_file()
+    again = []
+    assert create(settings, again.append).measured == made.measured
+    assert [type(event) for event in again] == [Made] and len(tracked) == 1
+
+
+def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):
+    def stop_at(event):
+        if isinstance(event, Preview) and event.share > 0.7:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        create(settings, stop_at)
+    assert not settings.out.exists()
+    told = []
+    create(settings, told.append)
+    assert len(tracked) == 1
+    (planned,) = [event for event in told if isinstance(event, Planned)]
+    assert planned.seconds["track"] == 0 and planned.seconds["learn"] > 0
+    first = next(e.share for e in told if isinstance(e, Advanced) and e.step == "learn")
+    assert first == 9 / 12
+
+
+def test_a_video_of_which_nothing_can_be_made(tracked, settings, monkeypatch, capfd):
+    worse = Examination(30.0, 25.0, (Advice("face", "refused", "no face is found."),), True)
+    monkeypatch.setattr(room, "examine", lambda *_: worse)
+    told = []
+    with pytest.raises(CaptureError, match=r"ada\.mp4: no face is found\."):
+        create(settings, told.append)
+    assert [type(event) for event in told] == [Looked] and not tracked
+    assert settings.video.read_bytes() == b"a video"
+
+
+def test_a_disk_without_room_is_told_before_the_work(tracked, settings, monkeypatch):
+    usage = type("Usage", (), {"free": 1e8})
+    monkeypatch.setattr(plan.shutil, "disk_usage", lambda _: usage)
+    with pytest.raises(StorageError, match=r"has 0\.1 GB left and 0\.5 GB are needed"):
+        create(settings, lambda _: None)
+    assert not tracked
+
+
+def test_the_terminal_says_what_matters(tracked, settings, capfd):
+    words = ["create", str(settings.video), str(settings.out), "--consent", "yes"]
+    assert main(words) == 0
+    said = " ".join(capfd.readouterr().out.split())
+    for part in (
+        "What would make the avatar better: - at 2 to 3 s: blurred.",
+        "Quality good takes about",
+        "all in all: quick",
+        "On 2 pictures that it never saw:",
+        f"Talk with it: ico3d serve {settings.out}",
+    ):
+        assert part in said
+    assert settings.out.with_suffix(".work").joinpath("face.jpg").is_file()

@@ -1,0 +1,74 @@
+import pytest
+
+from ico3d.creating.settings import CreateSettings
+from ico3d.creating.workplace import workplace
+from ico3d.errors import SettingsError, StorageError
+
+
+@pytest.fixture
+def settings(tmp_path):
+    (tmp_path / "me.mp4").write_bytes(b"a video")
+    return CreateSettings(tmp_path / "me.mp4", tmp_path / "me.ico3d", consent="I agree")
+
+
+def _other(settings, **changes):
+    return CreateSettings(**{**vars(settings), **changes})
+
+
+def _refused(settings, error, sentence):
+    with pytest.raises(error, match=sentence), workplace(settings):
+        pass
+
+
+def test_one_process_at_a_time(settings):
+    with workplace(settings) as place:
+        _refused(settings, SettingsError, "is being made just now")
+    with workplace(settings) as again:
+        assert again == place
+
+
+def test_what_a_killed_process_left_is_cleared_and_the_rest_kept(settings):
+    with workplace(settings) as place:
+        left = place.folder / ".capture-exact.abc" / "ori_imgs"
+        left.mkdir(parents=True)
+        place.capture("exact").mkdir()
+    with workplace(settings):
+        assert not left.parent.exists() and place.capture("exact").is_dir()
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"consent": "something else"}, r"with another consent \(me.mp4\)"),
+        ({"licence": "CC0"}, "with another licence"),
+    ],
+)
+def test_a_folder_keeps_to_what_was_agreed(settings, change, sentence):
+    with workplace(settings):
+        pass
+    _refused(_other(settings, **change), SettingsError, sentence)
+
+
+def test_a_folder_keeps_to_one_video(settings, tmp_path):
+    with workplace(settings):
+        pass
+    (tmp_path / "other.mp4").write_bytes(b"another video")
+    other = _other(settings, video=tmp_path / "other.mp4")
+    _refused(other, SettingsError, "of another video")
+    renamed = settings.video.rename(tmp_path / "renamed.mp4")
+    with workplace(_other(settings, video=renamed)):
+        pass
+
+
+def test_an_avatar_made_by_others_is_not_written_over(settings):
+    settings.out.write_bytes(b"somebody else's")
+    _refused(settings, SettingsError, "exists already")
+    bundle = settings.out.with_suffix(".zip")
+    _refused(_other(settings, out=bundle), SettingsError, r"must end in \.ico3d")
+    nothing = _other(settings, video=settings.video / "no", out=bundle.with_name("b.ico3d"))
+    _refused(nothing, SettingsError, "cannot be read")
+
+
+def test_a_place_that_cannot_be_written(settings):
+    inside = _other(settings, out=settings.video / "me.ico3d")
+    _refused(inside, StorageError, "cannot be written")

@@ -1,0 +1,38 @@
+import { isSynthetic, type Provenance } from '../../bundle/manifest.ts';
+import type { PageWords } from '../../words/page-words.ts';
+import { say, type Key, type Sentence } from '../../words/text.ts';
+import { byId } from '../elements.ts';
+import { Disclosure } from './disclosure.ts';
+
+const NOT_STATED = 'not stated';
+
+/** The mark that a machine is seen and heard, and behind it whose likeness the avatar is, who agreed and who made it of what. */
+export function showOrigin(root: ParentNode, words: PageWords, provenance: Provenance): void {
+  new Disclosure(byId(root, 'ai-button'), byId(root, 'origin'));
+  const list = byId(root, 'origin').querySelector('dl')!;
+  list.replaceChildren(
+    ...rowsOf(provenance).flatMap(([name, value]) => {
+      const [term, told] = [document.createElement('dt'), document.createElement('dd')];
+      words.write(term, say(name));
+      words.write(told, value);
+      return [term, told];
+    }),
+  );
+}
+
+/** What is told, row by row. */
+export function rowsOf(provenance: Provenance): [Key, Sentence][] {
+  const { consent, sources, licence, made_by, made_on } = provenance;
+  const who: [Key, Sentence][] = isSynthetic(provenance)
+    ? [['origin.likeness', say('origin.nobody')]]
+    : [
+        ['origin.likeness', told(provenance.likeness)],
+        ['origin.consent', told(consent)],
+      ];
+  return [...who, ['origin.sources', told(sources.join('; '))], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
+}
+
+/** A text of whoever made the bundle, as it is. */
+function told(text = ''): Sentence {
+  return text.trim() && text !== NOT_STATED ? text : say('origin.unstated');
+}

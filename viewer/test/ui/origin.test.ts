@@ -1,0 +1,45 @@
+import { expect, test } from 'vitest';
+import { rowsOf } from '../../src/ui/sheets/origin.ts';
+import { textOf } from '../../src/words/text.ts';
+
+const FULL = {
+  kind: 'portrait',
+  sources: ['me.mp4', 'hall'],
+  consent: 'agreed in writing',
+  licence: 'ours',
+  likeness: 'Jane Doe',
+  made_by: 'The museum',
+  made_on: '2026-11-24',
+};
+const read = (provenance: typeof FULL | Omit<typeof FULL, 'likeness' | 'made_by' | 'made_on'>) =>
+  rowsOf(provenance).map(([name, value]) => [textOf({ key: name }, 'en'), textOf(value, 'en')]);
+
+test('all that a bundle states is told', () => {
+  expect(read(FULL)).toEqual([
+    ['Likeness of', 'Jane Doe'],
+    ['Consent', 'agreed in writing'],
+    ['Made from', 'me.mp4; hall'],
+    ['Licence', 'ours'],
+    ['Made by', 'The museum'],
+    ['Made on', '2026-11-24'],
+  ]);
+});
+
+test('what it does not state is said to be so', () => {
+  const { likeness: _, made_by: __, made_on: ___, ...older } = FULL;
+  const told = Object.fromEntries(read({ ...older, consent: 'not stated', sources: [] }));
+  expect(told).toEqual({
+    'Likeness of': 'not stated',
+    Consent: 'not stated',
+    'Made from': 'not stated',
+    Licence: 'ours',
+    'Made by': 'not stated',
+    'Made on': 'not stated',
+  });
+});
+
+test('a synthetic person is nobody, who need not agree', () => {
+  const told = Object.fromEntries(read({ ...FULL, kind: 'synthetic' }));
+  expect(told['Likeness of']).toBe('nobody: this person does not exist');
+  expect(told).not.toHaveProperty('Consent');
+});
