@@ -8,6 +8,7 @@ import pytest
 
 from ico3d.chat.doctor import deployment, machine, visit
 from ico3d.chat.doctor.deployment import Place
+from ico3d.chat.serving.sites import Sites
 from ico3d.cli import main
 from ico3d.errors import SettingsError
 from support.chat.serving import TYPED, free_port, serving
@@ -23,9 +24,9 @@ def told(findings, grade="bad"):
     return [f"{one.what}: {one.mend}" for one in findings if one.grade == grade]
 
 
-def looked_at(url):
+def looked_at(url, key=""):
     """All that is found from outside, in a thread: the server runs in the loop."""
-    return asyncio.to_thread(lambda: list(deployment.findings(url)))
+    return asyncio.to_thread(lambda: list(deployment.findings(url, key)))
 
 
 async def test_a_server_that_is_well(bundle):
@@ -44,6 +45,17 @@ async def test_a_server_that_ends_or_has_not_the_session(bundle, monkeypatch):
         assert lost.startswith("a page that loses its connection reaches another server: ")
         sessions.line.close()
         assert told(await looked_at(url))[0].startswith("the server is about to end: ")
+
+
+async def test_a_server_that_asks_for_a_key(bundle):
+    key = "a key that nobody guesses"
+    async with serving(bundle, TYPED, sites=Sites(key=key)) as (url, sessions):
+        for wrong in ("", "another"):
+            found = await looked_at(url, wrong)
+            assert not told(found) and found[-1].grade == "weak" and "a key" in found[-1].what
+            assert len(sessions) == 0
+        found = await looked_at(url, key)
+        assert not told(found) and "a conversation begins" in [one.what for one in found]
 
 
 async def test_a_name_that_the_server_does_not_know(bundle):

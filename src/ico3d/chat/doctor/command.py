@@ -1,5 +1,6 @@
 """The verb `ico3d doctor`."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from rich.console import Console
 
 from ico3d.bundle import packaged
 from ico3d.chat.observing.operator_log import set_up_log
-from ico3d.errors import DiagnosisError
+from ico3d.errors import DiagnosisError, SettingsError
 
 if TYPE_CHECKING:
     from ico3d.chat.doctor.finding import Finding
@@ -26,12 +27,14 @@ class Doctor:
     Attributes:
         url: Address of a deployment, such as https://avatar.example.org; without one, this machine
             is looked at.
+        key_variable: Environment variable with the key of a deployment that asks for one.
         bundle: Avatar that this machine is to serve.
         settings: Settings file that it is to serve with.
         port: Port that it is to serve on.
     """
 
     url: Annotated[str, tyro.conf.Positional] = ""
+    key_variable: str = ""
     bundle: Path = Path(packaged.NAME)
     settings: Path | None = None
     port: int = 8765
@@ -40,7 +43,7 @@ class Doctor:
         """Prints a line for each thing that was looked at.
 
         Raises:
-            SettingsError: If the URL is none.
+            SettingsError: If the URL is none, or the variable holds no key.
             DiagnosisError: If something has to be mended.
         """
         set_up_log(verbose=False)
@@ -58,4 +61,7 @@ class Doctor:
             return machine.findings(self.bundle, self.settings, self.port)
         from ico3d.chat.doctor import deployment
 
-        return deployment.findings(self.url)
+        key = os.environ.get(self.key_variable, "")
+        if self.key_variable and not key:
+            raise SettingsError(f"the environment variable {self.key_variable} holds no key.")
+        return deployment.findings(self.url, key)

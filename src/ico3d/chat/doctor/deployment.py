@@ -59,8 +59,12 @@ class Place:
         return f"{self.scheme}://{host}" + (f":{self.port}" if self.port else "")
 
 
-def findings(url: str) -> Iterator[Finding]:
+def findings(url: str, key: str = "") -> Iterator[Finding]:
     """Looks at a deployment from outside, as a visitor's browser would, and visits it.
+
+    Args:
+        url: Its address.
+        key: The key that visitors have to show; empty for none.
 
     Raises:
         SettingsError: If the URL is none.
@@ -81,11 +85,17 @@ def findings(url: str) -> Iterator[Finding]:
         yield answering
         if answering.grade == "bad":
             return
-        yield from of_pages(client)
+        yield from of_page(client)
         if place.scheme == "https" and place.port in (None, 443):
             yield of_plain(place)
+        token = token_for(client, key) if key else None
+        bundle = of_bundle(client, token)
+        yield bundle
+        if bundle.grade != "good":
+            return
         cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
-    visitor = visit.Visitor(place.url, context if place.scheme == "https" else None, cookies)
+    secured = context if place.scheme == "https" else None
+    visitor = visit.Visitor(place.url, secured, cookies, token)
     yield from asyncio.run(visitor.findings())
 
 
@@ -143,8 +153,6 @@ def of_server(client: httpx.Client, place: Place) -> Finding:
             "the server does not know this name",
             f"serve with --name {place.host}, and let the proxy leave Host as it is.",
         )
-    if answer.status_code == 401:
-        return bad("the server wants a token or a key", "from here on nothing could be looked at.")
     if answer.status_code == 503 and answer.headers.get("content-type") == "application/json":
         return bad("the server is about to end", "wait until it has started again.")
     if answer.status_code != 200:
@@ -155,8 +163,8 @@ def of_server(client: httpx.Client, place: Place) -> Finding:
     return good("the server is ready for visitors")
 
 
-def of_pages(client: httpx.Client) -> Iterator[Finding]:
-    """Whether page and bundle come whole, protected and compressed, and figures do not."""
+def of_page(client: httpx.Client) -> Iterator[Finding]:
+    """Whether the page comes whole, protected and compressed, and figures do not."""
     page = client.get("/")
     if page.status_code != 200:
         yield bad(f"the page does not come (status {page.status_code})", page.text.strip()[:200])
@@ -166,15 +174,30 @@ def of_pages(client: httpx.Client) -> Iterator[Finding]:
         yield weak("the page is not compressed", "let the proxy pass Accept-Encoding on.")
     else:
         yield good("the page comes compressed, with the headers that protect it")
-    manifest = client.get("/bundle/manifest.json")
-    if manifest.status_code == 200:
-        yield good("the bundle is served")
-    else:
-        yield bad(f"the bundle is not served (status {manifest.status_code})", "see its log.")
     if client.get("/metrics").status_code == 200:
         yield bad("figures are public at /metrics", "let the proxy pass only the page's port on.")
     else:
         yield good("figures are not public")
+
+
+def token_for(client: httpx.Client, key: str) -> str | None:
+    """What admits a page, for a key; None if it is wrong."""
+    answer = client.post("/token", headers={"Authorization": f"Bearer {key}"})
+    return str(answer.json()["token"]) if answer.status_code == 200 else None
+
+
+def of_bundle(client: httpx.Client, token: str | None) -> Finding:
+    """Whether the bundle is served to those who are admitted."""
+    parameters = {"token": token} if token else {}
+    manifest = client.get("/bundle/manifest.json", params=parameters)
+    if manifest.status_code == 200:
+        return good("the bundle is served")
+    if manifest.status_code == 401:
+        return weak(
+            "visitors have to show a key, so this is as far as one gets without it",
+            "name the environment variable that holds it with --key-variable.",
+        )
+    return bad(f"the bundle is not served (status {manifest.status_code})", "see the log.")
 
 
 def of_plain(place: Place) -> Finding:

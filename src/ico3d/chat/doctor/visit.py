@@ -24,15 +24,19 @@ FOREIGN = "https://foreign.example"
 class Visitor:
     """Opens the WebSockets of a server as its own page would."""
 
-    def __init__(self, url: str, context: ssl.SSLContext | None, cookies: str):
+    def __init__(
+        self, url: str, context: ssl.SSLContext | None, cookies: str, token: str | None = None
+    ):
         """Comes to a server.
 
         Args:
             url: Address of the page, without a slash at its end.
             context: How certificates are checked; None for plain HTTP.
             cookies: The header Cookie that the page would send, by which a proxy knows a visitor.
+            token: What admits the page; None where everybody is admitted.
         """
         self._url, self._context = url, context
+        self._admission = f"?token={token}" if token else ""
         self._headers = {"Cookie": cookies} if cookies else {}
 
     async def findings(self) -> Iterable[Finding]:
@@ -49,7 +53,7 @@ class Visitor:
         return [way, await self._strangers(), *await self._talk()]
 
     def _connect(self, path: str, origin: str) -> connect:
-        address = self._url.replace("http", "ws", 1) + path
+        address = self._url.replace("http", "ws", 1) + path + self._admission
         return connect(
             address,
             ssl=self._context,
