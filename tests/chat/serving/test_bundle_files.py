@@ -1,5 +1,7 @@
 """How a bundle's files travel: small where that helps, kept where the address has a hash."""
 
+import asyncio
+import gc
 import gzip
 import json
 
@@ -8,7 +10,7 @@ import pytest
 from fastapi import FastAPI, Request
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat.serving.bundle_files import BundleFiles
+from ico3d.chat.serving.bundle_files import PIECE, BundleFiles
 
 FOR_EVER = "public, max-age=31536000, immutable"
 HEAD, PICTURE = "head.safetensors", "thumbnail.png"
@@ -85,3 +87,19 @@ async def test_a_file_that_changed_on_disk_is_an_error_in_one_sentence(bundle, m
         answer = await page.get(f"/{HEAD}")
         assert (await page.get("/nothing")).status_code == 404
     assert answer.status_code == 500 and answer.text.count("\n") == 1
+
+
+async def test_many_slow_readers_share_one_copy(bundle, monkeypatch):
+    read, reads = bundle.read, []
+    monkeypatch.setattr(bundle, "read", lambda name: reads.append(name) or read(name))
+    files = BundleFiles(bundle, None)
+    scope = {"type": "http", "headers": [], "query_string": b"", "path": "/"}
+    slow = [files.answer(HEAD, Request(scope)).body_iterator for _ in range(50)]
+    first = [await anext(pieces) for pieces in slow]
+    assert reads == [HEAD] and max(map(len, first)) <= PIECE
+    assert first[0] + b"".join([piece async for piece in slow[0]]) == read(HEAD)
+    del slow, first
+    gc.collect()
+    await asyncio.sleep(0.1)  # the loop closes what was left amid its pieces
+    files.answer(HEAD, Request(scope))
+    assert reads == [HEAD, HEAD]  # nothing is kept that nobody is sent

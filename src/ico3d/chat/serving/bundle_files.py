@@ -5,12 +5,14 @@ address without a hash they ask again, and get 304 while the file is the same.
 """
 
 import gzip
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 from fastapi import Request, Response
-from fastapi.responses import PlainTextResponse
+from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST
@@ -30,6 +32,21 @@ KEPT_FILES = 32
 """Number of compressed files that are kept in memory, those that were asked for last."""
 MAX_COMPRESSED = 1 << 24
 """Largest size in bytes of a file that is compressed."""
+PIECE = 1 << 18
+"""Bytes that are handed to a connection at once, of which a slow reader leaves many waiting."""
+
+
+class Content:
+    """The bytes of an answer, shared by all who are being sent them."""
+
+    def __init__(self, data: bytes):
+        """Wraps the bytes of a whole file."""
+        self.data = data
+
+    async def pieces(self) -> AsyncIterator[bytes]:
+        """Yields the bytes in order."""
+        for at in range(0, len(self.data), PIECE):
+            yield self.data[at : at + PIECE]
 
 
 class BundleFiles:
@@ -39,6 +56,7 @@ class BundleFiles:
         """Serves the files of `bundle`, with `persona` in the manifest in place of its own."""
         self._bundle = bundle
         self._persona = persona
+        self._being_sent: WeakValueDictionary[str, Content] = WeakValueDictionary()
         self._compressed = lru_cache(KEPT_FILES)(self._compress)
 
     def answer(self, name: str, request: Request) -> Response:
@@ -51,11 +69,17 @@ class BundleFiles:
             headers = _headers(request, entry.sha256 if entry else None, small is not None)
             if "ETag" in headers and request.headers.get("if-none-match") == headers["ETag"]:
                 return Response(status_code=304, headers=headers)
-            data = small or self._content(name)
+            content = small or self._plain(name)
         except BundleError as error:
             return PlainTextResponse(f"{error}\n", 500)
         media_type = TYPES.get(Path(name).suffix, "application/octet-stream")
-        return Response(data, media_type=media_type, headers=headers)
+        headers["Content-Length"] = str(len(content.data))
+        return StreamingResponse(content.pieces(), media_type=media_type, headers=headers)
+
+    def _plain(self, name: str) -> Content:
+        """A file as it is; who asks while others are being sent it shares their bytes."""
+        content = self._being_sent.get(name) or Content(self._content(name))
+        return self._being_sent.setdefault(name, content)
 
     def _content(self, name: str) -> bytes:
         """A file as the page gets it: what a persona knows and how it behaves is not sent."""
@@ -65,13 +89,13 @@ class BundleFiles:
         shown = Persona(persona.name, persona.greeting, languages=persona.languages)
         return replace(self._bundle.manifest, persona=shown).to_json()
 
-    def _compress(self, name: str) -> bytes | None:
+    def _compress(self, name: str) -> Content | None:
         """A file's content by gzip; None where that saves little."""
         data = self._content(name)
         if len(data) > MAX_COMPRESSED:
             return None
         small = gzip.compress(data, mtime=0)
-        return small if len(small) <= WORTHWHILE * len(data) else None
+        return Content(small) if len(small) <= WORTHWHILE * len(data) else None
 
 
 def _takes_gzip(request: Request) -> bool:
