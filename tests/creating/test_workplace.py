@@ -60,6 +60,13 @@ def test_a_folder_keeps_to_one_video(settings, tmp_path):
         pass
 
 
+def test_an_avatar_that_was_written_right_before_a_kill_is_our_own(settings):
+    with workplace(settings):
+        settings.out.write_bytes(b"complete, and not yet noted")
+    with workplace(settings) as place:
+        assert not place.is_done(settings)
+
+
 def test_an_avatar_made_by_others_is_not_written_over(settings):
     settings.out.write_bytes(b"somebody else's")
     _refused(settings, SettingsError, "exists already")

@@ -27,8 +27,8 @@ class Planned:
     """How long what is left will take.
 
     Attributes:
-        seconds: Expected seconds of each step that is left; steps that are done have 0.
-        others: Expected seconds of everything by quality, were it all to be done.
+        seconds: Expected seconds of tracking, learning and measuring; what is done already has 0.
+        others: Expected seconds of all of these by quality, were everything to be done.
     """
 
     seconds: dict[Step, float]

@@ -16,6 +16,9 @@ from ico3d.splat.render import render
 GAUSSIANS, SIDE, TIMED = 8_000, 256, 6
 """Size of the step that is timed: Gaussians, pixels on each side, and how often it is done."""
 
+MOST_THREADS = numba.get_num_threads()
+"""Number of threads that numba has; asked before fewer are used."""
+
 
 def set_pace(device: DeviceName) -> float:
     """Lets as many threads compute as are fastest, all or one, and returns how fast they are.
@@ -30,7 +33,7 @@ def set_pace(device: DeviceName) -> float:
         SettingsError: If CUDA is asked for and does not work.
     """
     place = computing_device(device)
-    counts = sorted({1, numba.config.NUMBA_NUM_THREADS})
+    counts = sorted({1, MOST_THREADS})
     found = {count: _step_seconds(place, count) for count in counts}
     fastest = min(counts, key=found.__getitem__)
     _use_threads(fastest)

@@ -10,15 +10,17 @@ from ico3d.creating.looking.examine import Examination
 from ico3d.creating.settings import Quality
 from ico3d.errors import StorageError
 
-FACE, CUTOUT, REFINE, LEARN = 1.0, 6.0, 1.4, 3.6
-"""Work on a picture whose face is read, on one that is cut out, on a step that corrects a pose, and
-on one that learns: as multiples of the step that `pace` times (measured)."""
-MEASURE, BAKE = 80.0, 800.0
-"""Work of measuring an avatar and of baking it, in the same unit (measured)."""
+FACE, COLOURS, CUTOUT = 0.7, 160.0, 4.0
+"""Work of reading a face, of learning the colours by which people are cut out, and of cutting one
+out, as multiples of the step that `set_pace` times (seconds of one core by seconds of one core)."""
+REFINE = 1.5
+"""Work of a step that corrects a pose, in the same unit: 20 to 40 ms where the unit is 20."""
+LEARN, COMPARE = 9.2, 2.0
+"""Work of a step that learns, and of a picture that is compared, in the same unit, measured."""
 BYTES = 0.28e6
-"""Bytes that a kept picture of 512² pixels takes with all that belongs to it (measured)."""
+"""Bytes that a kept picture of 512² pixels takes with all that belongs to it, measured."""
 SPARE = 0.4e9
-"""Bytes for everything else: pictures that are not kept for long, checkpoints, the bundle."""
+"""Bytes that are to be free for everything else: checkpoints, previews, the avatar."""
 
 
 def pictures_of(quality: Quality, found: Examination) -> int:
@@ -27,7 +29,7 @@ def pictures_of(quality: Quality, found: Examination) -> int:
 
 
 def expected(quality: Quality, found: Examination, step: float) -> dict[Step, float]:
-    """Seconds that each step from a video to an avatar will take.
+    """Seconds that the steps from a video to an avatar will take, but for baking at the end.
 
     Args:
         quality: How much work goes into it.
@@ -35,14 +37,13 @@ def expected(quality: Quality, found: Examination, step: float) -> dict[Step, fl
         step: Seconds of one step of the standard size.
     """
     pictures = pictures_of(quality, found)
-    track = FACE * found.seconds * FPS + CUTOUT * pictures
+    track = FACE * found.seconds * FPS + COLOURS + CUTOUT * pictures
     if quality.refine:
         track += REFINE * steps_for(pictures)
     return {
         "track": step * track,
         "learn": step * LEARN * quality.head.steps,
-        "measure": step * MEASURE,
-        "bake": step * BAKE,
+        "measure": step * COMPARE * pictures / 11,
     }
 
 

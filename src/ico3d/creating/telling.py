@@ -3,15 +3,13 @@
 from PIL import Image
 from rich.console import Console
 
-from ico3d.creating.events import STEPS, Event, Looked, Made, Planned, Preview
+from ico3d.creating.events import Event, Looked, Made, Planned, Preview, Step
 from ico3d.creating.settings import CreateSettings
 
-NAMES = {
-    "look": "looking",
+NAMES: dict[Step, str] = {
     "track": "tracking",
     "learn": "learning the face",
     "measure": "measuring",
-    "bake": "baking",
 }
 
 
@@ -39,11 +37,14 @@ class Terminal:
             self._console.print(line, markup=False)
 
     def _of_plan(self, plan: Planned) -> list[str]:
-        parts = [f"{NAMES[s]} {duration(plan.seconds[s])}" for s in STEPS if plan.seconds.get(s)]
+        parts = [f"{NAMES[s]} {duration(plan.seconds[s])}" for s in NAMES if plan.seconds.get(s)]
         total = duration(sum(plan.seconds.values()))
         times = ", ".join(f"{name} {duration(seconds)}" for name, seconds in plan.others.items())
+        if not parts:
+            return ["Everything but baking is done."]
         return [
-            f"Quality {self._settings.quality} takes about {total} from here: {', '.join(parts)}.",
+            f"Quality {self._settings.quality} takes about {total} from here: {', '.join(parts)}; "
+            "then baking.",
             f"On this machine as busy as it is now, all in all: {times} (--quality).",
             f"{self._face} shows the face as it learns: recorded | learnt.",
             "Interrupt whenever you like: the same command goes on.",

@@ -72,7 +72,7 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
     out, folder = settings.out, settings.out.with_suffix(".work")
     if out.suffix != ".ico3d":
         raise SettingsError(f"{out} must end in .ico3d: that is the avatar's file.")
-    if out.exists() and not (folder / DONE).is_file():
+    if out.exists() and not (folder / ABOUT).is_file():
         raise SettingsError(f"{out} exists already: choose another name, or remove it.")
     try:
         folder.mkdir(parents=True, exist_ok=True)

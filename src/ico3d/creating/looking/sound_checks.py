@@ -57,5 +57,5 @@ def _clips(pieces: np.ndarray) -> np.ndarray:
     """(P,) whether a piece has samples at the limit in a row."""
     at_limit = np.abs(pieces) >= CLIPPED  # (P, n)
     rows = at_limit.shape[1] - IN_A_ROW + 1
-    every = np.stack([at_limit[:, i : i + rows] for i in range(IN_A_ROW)]).all(0)
-    return every.any(1)
+    in_a_row = np.stack([at_limit[:, i : i + rows] for i in range(IN_A_ROW)])  # (3, P, rows)
+    return np.any(np.all(in_a_row, axis=0), axis=1)
