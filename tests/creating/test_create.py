@@ -1,5 +1,6 @@
 """From a video to an avatar, with a recording of a few tiny pictures in the tracker's place."""
 
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -15,7 +16,7 @@ from ico3d.creating.events import STEPS, Advanced, Looked, Made, Planned, Previe
 from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.examine import Examination
 from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
-from ico3d.errors import CaptureError, StorageError
+from ico3d.errors import CaptureError, SettingsError, StorageError
 from ico3d.head.settings import Density, HeadSettings, Initial, Network
 from support.recordings.portrait_folder import write_folder
 
@@ -56,6 +57,12 @@ def tracked(monkeypatch):
 def settings(tmp_path):
     (tmp_path / "ada.mp4").write_bytes(b"a video")
     return CreateSettings(tmp_path / "ada.mp4", tmp_path / "ada.ico3d", consent="yes")
+
+
+def test_nothing_is_made_of_somebody_who_did_not_agree(tracked, settings):
+    with pytest.raises(SettingsError, match=r"--consent"):
+        create(replace(settings, consent="not stated"), print)
+    assert not tracked and not settings.out.exists()
 
 
 def test_the_whole_way_and_again(tracked, settings, capfd):

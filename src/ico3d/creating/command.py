@@ -31,4 +31,4 @@ class Create(CreateSettings):
         if self.serve:
             from ico3d.chat.commands import Serve
 
-            Serve(self.out, open=True).run()
+            Serve(self.out, browser=True).run()

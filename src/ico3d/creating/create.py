@@ -6,12 +6,15 @@ from functools import partial
 from pathlib import Path
 
 from ico3d.avatar.baking.command import Bake
+from ico3d.avatar.baking.telling.about import provenance_of
+from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.bundle.persona import Persona, read_persona
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait.settings import CUTOUTS, FACES, POSES, PortraitSettings
 from ico3d.capture.portrait.track import track_portrait
 from ico3d.common.files import full_disk, write_atomic
+from ico3d.common.people.stated import NOT_STATED
 from ico3d.common.typed import plain
 from ico3d.creating.events import Advanced, Looked, Made, Measured, Planned, Step, Tell
 from ico3d.creating.learning import learn
@@ -47,13 +50,14 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
 
     Raises:
         CaptureError: If no avatar can be made of the video; the sentence says why.
-        SettingsError: If the avatar's name or the folder belongs to something else.
+        SettingsError: If the avatar's name or the folder belongs to something else, or nobody says
+            that the person agreed.
         StorageError: If the disk is full, or cannot be written.
         MissingModelError: If the face model is not installed.
         Ico3dError: As for the verbs that track, train and bake.
     """
     begin = time.monotonic()
-    persona = _persona(settings)
+    persona, said = _persona(settings), _statement(settings)
     with workplace(settings) as place, full_disk(place.folder):
         if place.is_done(settings):
             return _made(settings, place, begin, tell)
@@ -65,7 +69,7 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
         set_pace(settings.device)  # other programs may have come or gone
         head = learn(capture, place.head(settings.quality), settings, quality, tell)
         _measure(head, capture, place, settings, tell)
-        _bake(settings, place, capture.path, persona, tell)
+        _bake(settings, place, capture.path, persona, said, tell)
         place.note_done(settings)
         return _made(settings, place, begin, tell)
 
@@ -135,7 +139,12 @@ def _measure(
 
 
 def _bake(
-    settings: CreateSettings, place: Workplace, capture: Path, persona: Persona, tell: Tell
+    settings: CreateSettings,
+    place: Workplace,
+    capture: Path,
+    persona: Persona,
+    said: Statement,
+    tell: Tell,
 ) -> None:
     """Writes the avatar.
 
@@ -152,8 +161,23 @@ def _bake(
         strip=place.file(STRIP),
         force=True,
         device=settings.device,
+        statement=said,
     ).run()
     tell(Advanced("bake", 1.0, "made"))
+
+
+def _statement(settings: CreateSettings) -> Statement:
+    """What is said of the person; refused at once where nobody says that they agreed.
+
+    Raises:
+        SettingsError: If nobody does.
+    """
+    name = settings.out.stem
+    said = Statement(name, settings.consent, settings.licence, settings.made_by or name)
+    recorded = {"kind": "portrait", "sources": (settings.video.name,)}
+    unsaid = {"consent": NOT_STATED, "licence": NOT_STATED}
+    provenance_of({str(settings.video): recorded | unsaid}, said, settings.out)
+    return said
 
 
 def _made(settings: CreateSettings, place: Workplace, begin: float, tell: Tell) -> Made:

@@ -7,9 +7,13 @@ from typing import Annotated, Literal
 import tyro
 
 from ico3d.common.device import DeviceName
+from ico3d.common.people.stated import NOT_STATED
 from ico3d.head.settings import PRESETS, HeadSettings
 
 QualityName = Literal["quick", "good", "best"]
+
+OWN_USE = "for this person's own use"
+"""Licence of an avatar of which nothing else is said."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +25,10 @@ class CreateSettings:
         out: The avatar to write, NAME.ico3d; NAME is how it introduces itself.
         quality: How long to work on it: times for this machine are told before it starts.
         persona: TOML or JSON file that says who the avatar is; by default it knows its name alone.
-        consent: What the person agreed to; goes into the avatar's manifest.
-        licence: Licence of the recording; goes into the avatar's manifest.
+        consent: What the person agreed to, and how; goes into the avatar's manifest, and without it
+            nothing is made.
+        licence: Licence under which the avatar may be used; goes into the avatar's manifest.
+        made_by: Who makes the avatar; by default the person NAME.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
@@ -30,8 +36,9 @@ class CreateSettings:
     out: Annotated[Path, tyro.conf.Positional]
     quality: QualityName = "good"
     persona: Path | None = None
-    consent: str = "not stated"
-    licence: str = "not stated"
+    consent: str = NOT_STATED
+    licence: str = OWN_USE
+    made_by: str = ""
     device: DeviceName = "auto"
 
 
