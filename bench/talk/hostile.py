@@ -14,15 +14,19 @@ import itertools
 import sys
 import time
 from collections import Counter
+from dataclasses import dataclass
+from typing import Annotated
 from urllib.parse import urlsplit
 
 import httpx
 import numpy as np
+import tyro
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Answer, Audio, Error, Hello, Place, Text, Welcome
+from ico3d.cli import run_script
 
 NAME = "talk.example"
 MINE, NEIGHBOUR = "203.0.113.7", "198.51.100.9"
@@ -275,18 +279,33 @@ async def memory(target: Target) -> float:
     return float("nan")
 
 
-async def main(url: str, key: str) -> int:
-    """Runs all attempts; the exit status is how many succeeded."""
-    target, lost = Target(url, key), 0
-    headers = {"Authorization": f"Bearer {key}"}
-    target.token = httpx.post(f"{url}token", headers=headers).json()["token"]
-    for attempt in (getting_in, taking_places, asking, flooding, being_slow):
-        print(f"\n{attempt.__doc__}")
-        for claim, holds in (await attempt(target)).items():
-            print(f"  {'holds' if holds else 'BROKEN'}: {claim}")
-            lost += not holds
-    return lost
+@dataclass(frozen=True)
+class Hostile:
+    """Attacks a server; the exit status is the number of attempts that succeeded.
+
+    Attributes:
+        url: Address of the server.
+        key: Its key.
+    """
+
+    url: Annotated[str, tyro.conf.Positional]
+    key: Annotated[str, tyro.conf.Positional]
+
+    def run(self) -> None:
+        """Makes all attempts."""
+        sys.exit(asyncio.run(self._attack()))
+
+    async def _attack(self) -> int:
+        target, lost = Target(self.url, self.key), 0
+        headers = {"Authorization": f"Bearer {self.key}"}
+        target.token = httpx.post(f"{self.url}token", headers=headers).json()["token"]
+        for attempt in (getting_in, taking_places, asking, flooding, being_slow):
+            print(f"\n{attempt.__doc__}")
+            for claim, holds in (await attempt(target)).items():
+                print(f"  {'holds' if holds else 'BROKEN'}: {claim}")
+                lost += not holds
+        return lost
 
 
 if __name__ == "__main__":
-    sys.exit(asyncio.run(main(*sys.argv[1:3])))
+    sys.exit(run_script(Hostile))
