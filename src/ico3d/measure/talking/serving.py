@@ -93,11 +93,11 @@ def main(bundle: str, script: str, turns: str, sessions: str) -> None:
     settings = ChatSettings(turns=Turns(**json.loads(turns)), max_sessions=int(sessions))
     avatar = server.open_avatar(opened, settings)
     avatar = dataclasses.replace(avatar, services=Script(**json.loads(script)).services())
-    sessions = Sessions(avatar)
+    visitors = Sessions(avatar)
     listener = server.bind("127.0.0.1", 0)
-    app = server.make_app(opened, avatar, "127.0.0.1", sessions)
+    app = server.make_app(opened, avatar, "127.0.0.1", visitors)
     print(server.address(listener), flush=True)
-    server.make_server(app, sessions=sessions).run(sockets=[listener])
+    server.make_server(app, sessions=visitors).run(sockets=[listener])
 
 
 if __name__ == "__main__":
