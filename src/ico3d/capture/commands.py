@@ -47,8 +47,8 @@ class Portrait:
         from ico3d.capture.portrait.track import track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
-        about = (self.consent, self.licence, self.device)
-        settings = PortraitSettings(self.size, focal, self.refine, *about, likeness=self.likeness)
+        stated = (self.likeness, self.consent, self.licence)
+        settings = PortraitSettings(self.size, focal, self.refine, *stated, self.device)
         track_portrait(self.video, self.out, settings)
 
 
