@@ -80,7 +80,8 @@ def test_the_whole_way_and_again(tracked, settings, capfd):
     assert shares == [i / 12 for i in range(1, 13)]
     faces = [event.picture for event in told if isinstance(event, Preview)]
     assert len(faces) == 12 and faces[0].shape == (64, 128, 3)
-    assert made.measured.pictures == 2 and 0 < made.measured.face < 60
+    face = made.measured.face
+    assert made.measured.pictures == 2 and face is not None and 0 < face < 60
     assert made.strip.is_file()
     again = []
     assert create(settings, again.append).measured == made.measured
