@@ -64,15 +64,15 @@ class Shot:
         return ("--cameras", self.cameras, "--views-per-frame", self.views, *size)
 
 
-HEAD = Shot(cameras=24, frames=3000, views=2, size=768, fps=25)
-"""Two minutes of talk, each frame from two sides."""
-BODY = Shot(cameras=24, frames=100, views=24, size=1200, fps=4)
+HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=25)
+"""A minute of talk, each frame from another side."""
+BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4)
 """25 s, in which hands, head and feet do everything once."""
 TRAIN_HEAD = (
-    "--steps 16000 --initial.gaussians 20000 --density.max-gaussians 50000 --density.until 9000"
+    "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 120 --initial.gaussians 30000 --density.max-gaussians 60000 "
+    "--steps-per-frame 55 --initial.gaussians 30000 --density.max-gaussians 55000 "
     "--density.until 0.6 --joining.no-match-colors"
 )
 
@@ -119,7 +119,7 @@ class Demo:
         parts = (work / "head", work / "body-capture", work / "avatar")
         how = ("--method", "skinned", *self.body.split(), "--check", work / "check")
         ico3d("assemble", *parts, *seed, *how)
-        # Four frames a second, with the head turned elsewhere, are poses to learn, no gestures.
+        # 2.4 frames a second, with the head turned elsewhere, are poses to learn, no gestures.
         no_clips = to_toml((), self.body_shot.fps, self.body_shot.frames)
         (work / "avatar" / CUTS).write_text(no_clips)
         files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
