@@ -111,7 +111,8 @@ def test_the_verbs_do_so_for_a_body_on_a_skeleton(cuda, tmp_path, monkeypatch):
     body, bundle = tmp_path / "body", tmp_path / "a.ico3d"
     train_body(capture, body, job("skinned"))
     _run_there(monkeypatch, "evaluate", body, "capture", "--json", tmp_path / "figures.json")
-    _run_there(monkeypatch, "bake", body, "capture", bundle, *MADE)
+    agreed = ("--likeness", "Ada", "--consent", "tests", "--licence", "tests")
+    _run_there(monkeypatch, "bake", body, "capture", bundle, *agreed, *MADE)
     for avatar in (body, bundle):
         film = ("render", avatar, tmp_path / "a.mp4", "--size", 32, "--seconds", 0.1)
         _run_there(monkeypatch, *film)

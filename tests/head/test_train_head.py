@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from ico3d.capture.capture import Sound
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model_folder import TrainedHead
@@ -168,10 +169,16 @@ def test_the_adaptor_learns(tiny, tmp_path):
 
 
 def test_a_head_begins_with_the_lips_that_its_recording_tells(tiny, monkeypatch):
+    def audio(self):  # a tone that swells three times a second
+        times = np.arange(int(16000 * self.num_frames / self.fps)) / 16000
+        swell = 0.5 - 0.5 * np.cos(2 * np.pi * 3 * times)
+        return Sound((0.3 * swell * np.sin(2 * np.pi * 300 * times)).astype(np.float32), 16000)
+
     def landmarks(self, frame):  # a jaw that opens as loud as the sound is
         loud = np.abs(self.audio().samples[round(frame * 16000 / self.fps) :][:320]).mean()
         return np.full((68, 3), loud)
 
+    monkeypatch.setattr(type(tiny), "audio", audio)
     general = trainer_of(tiny, _job("speech"), "cpu")[0].adaptor.lips  # told by the encoder
     assert general[0].any() and not general[5:].any()
     monkeypatch.setattr(type(tiny), "landmarks_3d", landmarks)

@@ -6,6 +6,7 @@ import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from ico3d.head.model import HeadModel
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head
-from ico3d.head.watch import WatchedHead
+from ico3d.head.watch import WatchedHead, live_page
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.watch import RADIUS, LivePage
 from support.heads.shapes import head_shape
@@ -227,7 +228,7 @@ def test_watching_changes_nothing_of_what_is_learnt(head, tmp_path):
     port = _free_port()
     watching = threading.Thread(target=_watch_once, args=(port,))
     watching.start()
-    train_head(tiny, tmp_path / "model", JOB, port)
+    train_head(tiny, tmp_path / "model", JOB, partial(live_page, port=port))
     watching.join()
     for name, tensor in load_file(tmp_path / "model" / "model.safetensors").items():
         assert torch.equal(tensor, trained.model.state_dict()[name]), name
@@ -250,4 +251,4 @@ def _watch_once(port: int) -> None:
 def test_without_viser_one_is_told_what_to_install(tiny, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(MissingExtraError, match=r"'viser'.*ico3d\[watch\]"):
-        train_head(tiny, tmp_path / "model", JOB, 0)
+        train_head(tiny, tmp_path / "model", JOB, partial(live_page, port=0))

@@ -113,6 +113,7 @@ def test_every_verb_that_takes_a_device_is_tested_on_cuda():
     handed = {
         "assemble": "assemble(",
         "capture portrait": "track_portrait(",
+        "create": "train_head(",
         "measure ablations": "measure_ablations(",
     }
     tests = Path(__file__).parents[1]

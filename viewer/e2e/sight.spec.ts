@@ -60,7 +60,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     await hideBody(page);
     const assets = sent.filter(({ url }) => url.includes('/assets/')).map(({ bytes }) => bytes);
     expect(new Set(assets)).toEqual(new Set([0]));
-    expect(sent.find(({ url }) => url === demoUrl)!.bytes).toBeGreaterThan(0);
+    expect(sent.find(({ url }) => url === drawnBy('webgl', demoUrl!))!.bytes).toBeGreaterThan(0);
   });
 
   test.each([

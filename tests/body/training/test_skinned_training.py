@@ -130,7 +130,7 @@ def test_the_folder_holds_the_body(capture, tmp_path, method, monkeypatch):
     body = train_body(capture, tmp_path / "model", job(method))
     assert body.windows == (CLIP,)
     loaded = TrainedBody.load(tmp_path / "model")
-    assert loaded.summary["capture"]["licence"] == "for research"
+    assert loaded.summary["capture"]["licence"] == "not stated; for research"  # pictures; rig
     motion = loaded.models[0].motion
     assert isinstance(motion, Skinned) and motion.names == ("trunk", "shoulder")
     assert (motion.shapes > 0, motion.light) == (method == "skinned", method == "skinned")

@@ -196,7 +196,7 @@ def _rmsprop(
     second, counts = moments["basis.second"], moments["basis.steps"]
     rows = torch.nonzero(weights)[:, 0]  # (active,)
     counts[rows.cpu()] += 1
-    roots = (1 - BETA2 ** counts.clamp_min(1).double()).rsqrt().float().numpy()  # (R,)
+    roots = (1 - BETA2 ** counts.clamp_min(1).double()).rsqrt().float()  # (R,)
     if _has_kernel(basis):
         numbers = torch.arange(basis.shape[1]) if chosen is None else chosen  # (N or n,)
         rmsprop_rank_one(
@@ -206,7 +206,7 @@ def _rmsprop(
             gradient.contiguous().numpy(),
             rows.numpy(),
             rates.contiguous().numpy(),
-            roots,
+            roots.numpy(),
             pulls.numpy(),
             numbers.numpy(),
         )
