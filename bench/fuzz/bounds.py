@@ -125,6 +125,9 @@ def _work(reader: Reader, numbers: range, seed: int, bounds: Bounds, sending: in
     status = 1
     try:
         logging.disable()
+        for bound in (signal.SIGPROF, signal.SIGALRM):
+            signal.signal(bound, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGPROF, signal.SIGALRM))
         with (
             tempfile.TemporaryDirectory() as folder,
             os.fdopen(sending, "w", buffering=1) as reports,

@@ -179,7 +179,7 @@ REQUESTS = {
         "open",
         _request("GET /bundle/manifest.json?sha256=0", "If-None-Match: x", "Range: bytes=0-9"),
     ),
-    "metrics": _written("open", _request("GET /metrics", "Origin: http://127.0.0.1")),
+    "health": _written("open", _request("GET /health", "Origin: http://127.0.0.1")),
     "socket": _written("open", _request("GET /echo", *SOCKET) + b"\x81\x82\0\0\0\0hi"),
     "conversation": _written("open", _request("GET /ws", *SOCKET) + b"\x81\x82\0\0\0\0{}"),
     "token": _written("chat", _request("POST /token?origin=https://example.org", KEYED)),

@@ -32,7 +32,8 @@ export function drawSeldom(page: Page, every = Infinity): Promise<void> {
  */
 export function hideBody(page: Page): Promise<void> {
   return page.evaluate(() => {
-    for (const object of window.ico3d!.body?.objects ?? []) object.visible = false;
+    const { body, skinned } = window.ico3d!;
+    for (const object of (body ?? skinned)?.objects ?? []) object.visible = false;
   });
 }
 

@@ -39,12 +39,13 @@ export async function watchMouth(page: Page): Promise<void> {
     const record: NonNullable<Window['mouth']> = { sights: [], pictures: [] };
     window.mouth = record;
     const gl = stage.renderer.getContext();
-    if (window.ico3d!.body) {
+    if (window.ico3d!.body ?? window.ico3d!.skinned) {
       // Of a whole person the face is but a few pixels: look closer, through the same lens.
       const { camera } = stage.orbit;
       const reach = 0.14; // m about the head's middle
-      const { x, y } = head!.generator.position.clone().project(camera);
-      const depth = camera.position.distanceTo(head!.generator.position);
+      const middle = head!.generator.getWorldPosition(camera.position.clone());
+      const depth = camera.position.distanceTo(middle);
+      const { x, y } = middle.project(camera);
       const side = reach / (depth * Math.tan((camera.fov * Math.PI) / 360)); // of half the picture's height
       const [width, height] = [camera.aspect, 1];
       camera.setViewOffset(
