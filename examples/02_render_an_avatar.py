@@ -13,6 +13,7 @@ import torch
 import tyro
 from PIL import Image
 
+from ico3d.avatar.poseable import poseable_of
 from ico3d.avatar.render_bundle import avatar_gaussians, baked_gaussians, visitor_camera
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.packaged import bundle_path
@@ -32,6 +33,9 @@ def bundled(path: Path, size: int) -> tuple[Gaussians, Camera]:
     rest = bundle.manifest.head.idle_expression
     if bundle.manifest.body is not None:
         return avatar_gaussians(bundle, 0.0, rest), camera
+    if person := poseable_of(bundle, None):  # on a skeleton
+        by_role, root = person.performer(seed=0).at(np.zeros(1))  # (1, R, 4), (1, 3)
+        return person.gaussians(by_role[0], root[0], np.array(rest)), camera
     return baked_gaussians(head, np.array(rest)).transform(poses[0]), camera
 
 

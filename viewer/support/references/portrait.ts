@@ -21,7 +21,7 @@ export function makePortrait(folder: string): string {
   ico3d('capture', 'portrait', clip!, capture!, '--size', '128', '--no-refine');
   ico3d('train', 'head', capture!, model!, '--preset', 'cpu', ...SHORT.split(' '));
   // Forced: half a minute of training need not reach what avatars for people must.
-  ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force');
+  ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force', '--likeness', 'a test', '--consent', 'none needed', '--licence', 'tests', '--made-by', 'a test');
   return bundle!;
 }
 
