@@ -8,7 +8,7 @@ from random import Random
 from fuzz.damage.files import Files, damaged
 from ico3d.errors import Ico3dError
 
-LONGEST_SENTENCE = 1500
+LONGEST_SENTENCE = 1100
 
 
 class Unclear(Exception):

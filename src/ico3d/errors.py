@@ -1,16 +1,22 @@
 """Errors that a user can cause. Each carries one clear sentence: what, where, what to do."""
 
+MOST_LETTERS = 1000
+"""Length of a sentence, beyond which its middle is left out."""
+
 
 class Ico3dError(Exception):
     """Base of every error the command line prints as one sentence, without a traceback."""
 
     def __str__(self) -> str:
-        """The sentence, on one line and without characters that a terminal would obey.
+        """The sentence, on one line, of bounded length, without characters that a terminal obeys.
 
         Sentences quote names and values from files that anybody may have made.
         """
         text = super().__str__()
-        return text if text.isprintable() else "".join(map(_shown, text))
+        shown = text if text.isprintable() else "".join(map(_shown, text))
+        if len(shown) <= MOST_LETTERS:
+            return shown
+        return f"{shown[: MOST_LETTERS // 2]} … {shown[-MOST_LETTERS // 2 :]}"
 
     def __reduce__(self):
         """Travels between processes as its sentence, whatever its constructor takes."""

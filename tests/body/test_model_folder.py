@@ -10,6 +10,7 @@ from ico3d.body.motion.formulas import Still
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.errors import ModelError
+from ico3d.training.checkpoint import load_tensors, save_tensors
 from support.bodies.window_parts import ENCODED, canonical
 
 
@@ -77,3 +78,21 @@ def test_a_window_of_something_else_is_refused(tmp_path):
     save_window(tmp_path / "w.safetensors", model)
     with pytest.raises(ModelError, match="superfluous"):
         load_window(tmp_path / "w.safetensors")
+
+
+@pytest.mark.parametrize("named", ["a" * 5000, "\0", "\ud800", 1])
+def test_names_that_no_file_can_have(body, tmp_path, named):
+    about = json.loads((tmp_path / ABOUT).read_text())
+    about["windows"][0]["file"] = named
+    (tmp_path / ABOUT).write_text(json.dumps(about))
+    with pytest.raises(ModelError):
+        TrainedBody.load(tmp_path)
+
+
+def test_a_window_that_cannot_be_drawn_is_refused_when_it_is_read(body, tmp_path):
+    """Planes of another size than the window's description says."""
+    tensors, about = load_tensors(tmp_path / "0.safetensors")
+    about["encoder"]["space"] = [5]
+    save_tensors(tmp_path / "0.safetensors", tensors, about)
+    with pytest.raises(ModelError, match="does not hold a window of a body"):
+        TrainedBody.load(tmp_path)

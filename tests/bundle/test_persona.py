@@ -55,6 +55,7 @@ def test_a_file_may_say_all_or_only_the_name(tmp_path):
         ('"en+f2"', "2", "must be a text"),
         ("Good evening.", "x" * 4001, "greeting must have at most 4000"),
         ("[voice]", "[voice", "not valid TOML"),
+        ("[voice]", "a = " + "[" * 20_000, "not valid TOML"),
     ],
 )
 def test_what_makes_no_sense_is_one_sentence(tmp_path, old, new, message):

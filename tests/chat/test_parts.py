@@ -186,6 +186,7 @@ def test_settings_come_from_toml_and_json(tmp_path):
         "[turns]\npause = 5",
         "turns = 5",
         "x = 1",
+        "a = " + "[" * 20_000,
         "= =",
     ],
 )

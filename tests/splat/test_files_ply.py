@@ -202,3 +202,15 @@ def test_large_files_are_read_fast_and_in_little_memory(tmp_path):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2.5 * path.stat().st_size
+
+
+def test_normals_that_are_not_whole_are_none(tmp_path):
+    data = ply_bytes(random_gaussians(3, 0), tmp_path).replace(b"float nz", b"float no")
+    (tmp_path / "a.ply").write_bytes(data)
+    assert read_gaussians(tmp_path / "a.ply").normals is None
+
+
+def test_a_refusal_is_a_whole_sentence(tmp_path):
+    (tmp_path / "a.ply").write_bytes(b"ply\n")
+    with pytest.raises(GaussianFileError, match=r"a\.ply: .*\.$"):
+        read_gaussians(tmp_path / "a.ply")

@@ -12,10 +12,12 @@ from ico3d.capture.video import open_video, read_sound
 from ico3d.rig.body_track import write_body_track
 from support.recordings import (
     dna_files,
+    films,
     foreign_models,
     multiview_folders,
     portrait_folder,
     renderme_files,
+    synthetic_folder,
 )
 
 MOST_PICTURES = 50
@@ -100,7 +102,7 @@ CAPTURES = (
     Reader(
         "video",
         {
-            kind: lambda folder, kind=kind: samples.write_film(folder / f"film.{kind}")
+            kind: lambda folder, kind=kind: films.write_film(folder / f"film.{kind}")
             for kind in ("mp4", "mkv", "avi")
         },
         lambda: _video,
@@ -109,8 +111,8 @@ CAPTURES = (
     Reader(
         "synthetic",
         {
-            "head": samples.write_synthetic,
-            "body": lambda folder: samples.write_synthetic(folder, "body"),
+            "head": synthetic_folder.write_synthetic,
+            "body": lambda folder: synthetic_folder.write_synthetic(folder, "body"),
         },
         lambda: _capture,
     ),

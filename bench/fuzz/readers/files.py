@@ -15,6 +15,7 @@ from ico3d.chat.settings.conversation import read_settings
 from ico3d.speech.runtime import open_speech
 from ico3d.splat.files.formats import read_gaussians, write_gaussians
 from support.bundles import random_body, random_bundle, random_skinned, random_whole, skinned_person
+from support.recordings import films
 from support.splats.gaussian_files import as_gsply, gsply, ply_bytes, random_gaussians, splat_bytes
 
 
@@ -138,10 +139,10 @@ FILES = (
     Reader(
         "WAV",
         {
-            "16 bits": lambda folder: samples.write_wav(folder / "a.wav"),
-            "stereo": lambda folder: samples.write_wav(folder / "a.wav", 48_000, 2),
-            "8 bits": lambda folder: samples.write_wav(folder / "a.wav", 8000, 1, 1),
-            "32 bits": lambda folder: samples.write_wav(folder / "a.wav", 22_050, 2, 4),
+            "16 bits": lambda folder: films.write_wav(folder / "a.wav"),
+            "stereo": lambda folder: films.write_wav(folder / "a.wav", 48_000, 2),
+            "8 bits": lambda folder: films.write_wav(folder / "a.wav", 8000, 1, 1),
+            "32 bits": lambda folder: films.write_wav(folder / "a.wav", 22_050, 2, 4),
         },
         lambda: _wav,
     ),

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,6 @@ from pipecat.frames.frames import Frame
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from fuzz.readers.samples import write_wav
 from ico3d.bundle.format import Bundle
 from ico3d.chat.remote.app import make_service_app
 from ico3d.chat.remote.limits import Limits
@@ -23,13 +23,16 @@ from ico3d.chat.settings.embedding import Embedding
 from ico3d.errors import ProtocolError
 from support.bundles.random_bundle import write_random_bundle
 from support.chat.remote import make_language
+from support.recordings.films import write_wav
 
 KEY = "a key of thirty-two characters!!"
 SETTINGS = ChatSettings(
     recognition=Choice("browser", {"fallback": ""}), language=Choice("persona-notes")
 )
-PATIENCE = 0.5
+PATIENCE = 30.0
 """Seconds for which a visitor waits for an answer."""
+IMPATIENCE = 0.1
+"""Seconds for which one waits who promised more of a request than came, so that none need come."""
 QUIET = 0.02
 """Seconds without a byte after which a server has said what it has to say."""
 
@@ -110,12 +113,19 @@ class Visits:
         answer = b""
         writer.write(request)
         with contextlib.suppress(ConnectionError, TimeoutError):
-            async with asyncio.timeout(PATIENCE):  # of one who waits for the rest of a request
+            async with asyncio.timeout(IMPATIENCE if _promises(request) else PATIENCE):
                 answer = await _answer(reader, running)
         writer.close()
         while running.server_state.tasks:  # what goes on when its visitor has gone, hangs
             await asyncio.sleep(0.002)
         return answer
+
+
+def _promises(request: bytes) -> bool:
+    """Whether a request may announce more than it holds."""
+    head, _, body = request.lower().partition(b"\r\n\r\n")
+    announced = re.findall(rb"content-length:[^0-9]*(\d{1,9})", head)
+    return b"transfer-encoding" in head or any(int(length) > len(body) for length in announced)
 
 
 async def _answer(reader: asyncio.StreamReader, running: uvicorn.Server) -> bytes:

@@ -147,13 +147,14 @@ class TrainedBody:
             entries = content["windows"]
             windows = tuple(Window(int(e["first"]), int(e["last"])) for e in entries)
             files = [folder / str(entry["file"]) for entry in entries]
+            inside = [file.resolve().is_relative_to(folder.resolve()) for file in files]
             fps, method = float(content["fps"]), content["method"]
             summary = content["summary"]
         except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no body ({error}): train one with ico3d train body."
             ) from error
-        for file in files:
-            if not file.resolve().is_relative_to(folder.resolve()):
-                raise ModelError(f"{folder / about} names a file outside of its folder: {file}.")
+        if not all(inside):
+            file = files[inside.index(False)]
+            raise ModelError(f"{folder / about} names a file outside of its folder: {file}.")
         return cls([load_window(file) for file in files], windows, fps, method, summary)

@@ -208,6 +208,8 @@ def _read_json(file: Path) -> dict:
     for name in ("blendshape_names", "cameras", "sources"):
         if not isinstance(about[name], list):
             raise CaptureError(f"{file}: {name} must be a list: record again.")
+    if not about["cameras"]:
+        raise CaptureError(f"{file} lists no cameras: record again.")
     return about
 
 

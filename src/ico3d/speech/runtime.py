@@ -300,4 +300,5 @@ def _session(model: bytes | Path | str, what: str, heavy: bool = False) -> Any:
     try:
         return onnxruntime.InferenceSession(source, options, providers=providers)
     except Exception as error:
-        raise ModelError(f"{what} is no usable ONNX model: {error}") from None
+        why = str(error).strip().rstrip(".")
+        raise ModelError(f"{what} is no usable ONNX model: {why}.") from None

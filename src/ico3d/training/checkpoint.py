@@ -109,9 +109,9 @@ def load_state(path: Path) -> dict:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[safe_open]:
-    if not path.is_file():
-        raise ModelError(f"there is no model file at {path}.")
     try:
+        if not path.is_file():
+            raise ModelError(f"there is no model file at {path}.")
         with safe_open(path, framework="pt") as file:
             yield file
     except (SafetensorError, *DAMAGED) as error:

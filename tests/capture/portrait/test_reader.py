@@ -196,3 +196,29 @@ def test_scaled_pictures_do_not_fit_the_lens(folder):
 def test_nothing_there(tmp_path):
     _fails(tmp_path / "nowhere", "there is no capture")
     _fails(tmp_path, "in no format known here")
+
+
+@pytest.mark.parametrize(
+    ("details", "word"), [({"fps": "fast"}, "fps"), ({"num_frames": 1e300}, "num_frames")]
+)
+def test_impossible_details_are_named(folder, details, word):
+    (folder / "ico3d.json").write_text(json.dumps(details))
+    _fails(folder, "ico3d.json", word)
+
+
+def test_a_frame_that_is_no_object(folder):
+    (folder / "transforms_train.json").write_text('{"frames": [1]}')
+    _fails(folder, "transforms_train.json", "img_id")
+
+
+def test_action_units_in_another_encoding(folder):
+    (folder / "au.csv").write_bytes(b"\xff\xfe")
+    _fails(folder, "au.csv", "cannot be read")
+
+
+def test_half_a_picture_of_a_parsing(folder):
+    file = folder / "parsing" / "0.png"
+    file.write_bytes(file.read_bytes()[:60])
+    capture = open_capture(folder)
+    with pytest.raises(CaptureError, match=r"0\.png cannot be read"):
+        capture.mask(0, 0)

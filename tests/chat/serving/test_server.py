@@ -12,13 +12,14 @@ from contextlib import closing
 import httpx
 import numpy as np
 import pytest
-from fastapi import FastAPI
+from fastapi import FastAPI, WebSocketDisconnect
 from threadpoolctl import threadpool_info, threadpool_limits
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.bundle.persona import Persona
 from ico3d.chat.performing.face import open_face
+from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import is_own
 from ico3d.chat.serving.server import bind, make_server
 from ico3d.chat.wire import protocol
@@ -47,6 +48,8 @@ pytestmark = pytest.mark.slow
         ("localhost:8765", "http://evil.example", False),
         ("localhost:8765", "null", False),
         ("localhost:8765", "file://", False),
+        ("localhost:8765", "http://[", False),
+        ("localhost:8765", "http://[::1", False),
         ("localhost:8765", "http://localhost.evil.example:8765", False),
         ("evil.example:8765", "http://evil.example:8765", False),
         ("evil.example:8765", None, False),
@@ -299,3 +302,22 @@ def test_a_server_multiplies_in_one_thread():
         make_server(FastAPI())
         pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
         assert pools and {pool["num_threads"] for pool in pools} == {1}
+
+
+async def test_who_leaves_while_an_echo_is_sent_is_no_fault():
+    class Left:
+        """A page that has gone when it is answered."""
+
+        async def accept(self):
+            pass
+
+        async def receive_text(self):
+            return "a"
+
+        async def send_text(self, text):
+            raise WebSocketDisconnect(1006)
+
+        async def close(self):
+            raise WebSocketDisconnect(1006)
+
+    await echo(Left())

@@ -211,3 +211,24 @@ def test_the_page_names_every_message_and_field():
             line for line in page.splitlines() if line.startswith(f"| `{kind.__name__.lower()}`")
         ]
         assert all(f"`{name}` (" in row for name in field_types(kind))
+
+
+HELLOS = [
+    '{"type":"hello","version":1,"session":null,"last_index":-1}',
+    *(
+        f'{{"type":"hello","version":{version},"session":"a","last_index":3,"wishes":{{}}}}'
+        for version in range(2, protocol.VERSION + 1)
+    ),
+]
+"""How pages of each version said hello."""
+
+
+@pytest.mark.parametrize("frame", HELLOS[1:])
+def test_a_page_of_any_version_can_say_which_it_is(frame):
+    """The server then tells it to be loaded anew."""
+    assert decode_client(frame).version == json.loads(frame)["version"]
+
+
+def test_a_page_of_the_first_version_is_told_what_it_lacks():
+    with pytest.raises(ProtocolError, match="field 'wishes' is missing"):
+        decode_client(HELLOS[0])

@@ -1,0 +1,79 @@
+"""Damaged synthetic captures, as `bench/fuzz` found them: one sentence each."""
+
+import json
+import struct
+import zlib
+
+import pytest
+
+from ico3d.capture.formats import open_capture
+from ico3d.errors import CaptureError
+from support.recordings.synthetic_folder import write_synthetic
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_synthetic(tmp_path)
+    return tmp_path
+
+
+def fails(call, *words):
+    with pytest.raises(CaptureError) as error:
+        call()
+    assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def told(folder, **about):
+    """Other values in its description."""
+    file = folder / "capture.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | about))
+    return folder
+
+
+def test_version_1_is_a_head(folder):
+    """Which had no field for what is shown."""
+    about = json.loads((folder / "capture.json").read_text()) | {"version": 1}
+    del about["shows"]
+    (folder / "capture.json").write_text(json.dumps(about))
+    capture = open_capture(folder)
+    assert capture.shows == "head" and capture.num_frames == 3
+    assert capture.image(0, 2).shape == (16, 24, 3) and capture.head_points().shape == (9, 3)
+
+
+@pytest.mark.parametrize(
+    ("about", "word"),
+    [
+        ({"fps": "fast"}, "fps"),
+        ({"num_frames": 1e300}, "num_frames"),
+        ({"sources": 1}, "sources"),
+        ({"cameras": []}, "cameras"),
+        ({"version": 3}, "this reads 1 and 2"),
+    ],
+)
+def test_impossible_values_are_named(folder, about, word):
+    fails(lambda: open_capture(told(folder, **about)), "capture.json", word)
+
+
+def test_brackets_without_end_are_no_description(folder):
+    (folder / "capture.json").write_text("[" * 100_000)
+    fails(lambda: open_capture(folder), "damaged")
+
+
+def test_damaged_phonemes_are_named(folder):
+    capture = open_capture(told(folder, phonemes=[1]))
+    fails(lambda: capture.phonemes, "phonemes")
+
+
+def test_a_picture_that_claims_to_be_huge_is_refused_undecoded(folder):
+    file = folder / "images" / "front" / "000000.png"
+    data = bytearray(file.read_bytes())
+    struct.pack_into(">I", data, 16, 1 << 30)
+    struct.pack_into(">I", data, 29, zlib.crc32(data[12:29]))
+    file.write_bytes(data)
+    fails(lambda: open_capture(folder).image(0, 0), "000000.png", "damaged")
+
+
+def test_half_a_sample_is_no_sound(folder):
+    file = folder / "audio.wav"
+    file.write_bytes(file.read_bytes()[:-1])
+    fails(lambda: open_capture(folder).audio(), "audio.wav", "damaged")
