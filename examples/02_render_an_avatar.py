@@ -29,12 +29,12 @@ def bundled(path: Path, size: int) -> tuple[Gaussians, Camera]:
     bundle = Bundle.open(bundle_path(path))
     head, poses = bundle.require_head()
     camera = visitor_camera(bundle.manifest.camera, size, size)
-    assert bundle.manifest.head is not None
-    rest = bundle.manifest.head.idle_expression
-    if bundle.manifest.body is not None:
+    assert (info := bundle.manifest.head) is not None
+    rest = info.idle_expression
+    if bundle.manifest.body:
         return avatar_gaussians(bundle, 0.0, rest), camera
     if person := poseable_of(bundle, None):  # on a skeleton
-        by_role, root = person.performer(seed=0).at(np.zeros(1))  # (1, R, 4), (1, 3)
+        by_role, root = person.performer(0).at(np.zeros(1))  # (1, R, 4), (1, 3)
         return person.gaussians(by_role[0], root[0], np.array(rest)), camera
     return baked_gaussians(head, np.array(rest)).transform(poses[0]), camera
 
@@ -50,12 +50,12 @@ def trained(folder: Path, recording: Path) -> tuple[Gaussians, Camera]:
 def main(
     avatar: Path = Path("demo"),
     capture: Path | None = None,
-    out: Path = Path("avatar.png"),
+    out: Path = Path("a.png"),
     size: int = 512,
 ) -> None:
     """Writes a PNG of AVATAR: a bundle or, with the capture that it was trained on, a head."""
     gaussians, camera = trained(avatar, capture) if capture else bundled(avatar, size)
-    picture = render(gaussians, [camera], background=torch.ones(3)).rgb[0]  # (H, W, 3)
+    picture = render(gaussians, [camera], background=torch.ones(3)).rgb[0]
     Image.fromarray((picture.clamp(0, 1) * 255).byte().numpy()).save(out)
     print(f"{out}: {len(gaussians)} Gaussians")
 

@@ -67,7 +67,7 @@ def broken(kind):
             while True:
                 taken[:] = []
         if kind == "bloats":
-            taken.append(b"a" * (100 << 20))
+            taken.append(b"a" * (200 << 20))
             taken.clear()
             raise CaptureError("It is too large.")
 
