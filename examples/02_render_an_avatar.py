@@ -29,8 +29,7 @@ def bundled(path: Path, size: int) -> tuple[Gaussians, Camera]:
     bundle = Bundle.open(bundle_path(path))
     head, poses = bundle.require_head()
     camera = visitor_camera(bundle.manifest.camera, size, size)
-    assert (info := bundle.manifest.head) is not None
-    rest = info.idle_expression
+    rest = bundle.manifest.head.idle_expression if bundle.manifest.head else ()
     if bundle.manifest.body:
         return avatar_gaussians(bundle, 0.0, rest), camera
     if person := poseable_of(bundle, None):  # on a skeleton
@@ -48,10 +47,7 @@ def trained(folder: Path, recording: Path) -> tuple[Gaussians, Camera]:
 
 @torch.no_grad()
 def main(
-    avatar: Path = Path("demo"),
-    capture: Path | None = None,
-    out: Path = Path("a.png"),
-    size: int = 512,
+    avatar: Path, capture: Path | None = None, out: Path = Path("avatar.png"), size: int = 512
 ) -> None:
     """Writes a PNG of AVATAR: a bundle or, with the capture that it was trained on, a head."""
     gaussians, camera = trained(avatar, capture) if capture else bundled(avatar, size)
