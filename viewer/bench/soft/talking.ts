@@ -9,7 +9,6 @@ import { existsSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { expect, test } from 'vitest';
-import type { AnimationInfo } from '../../src/bundle/animation.ts';
 import { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
 import { drawnBy } from '../../support/browser/path.ts';
@@ -19,7 +18,8 @@ import { ChatServer } from '../../support/servers/server.ts';
 const DEMO = join(REPOSITORY, 'src/ico3d/chat/data/demo.ico3d');
 const QUESTIONS = ['what is ico3d', 'what do I need to record']; // for each path and scene
 const FASTER = 5; // than software WebGL
-const SWEEP = 3.2; // s in which the recording of the body is played to its end, or back
+const GESTURES = ['open_hands', 'wave', 'shrug', 'point', 'think'];
+const PACE = 2500; // ms from one gesture to the next
 const FLIGHT = 3000; // ms until the camera is there
 const PATIENCE = { timeout: 60_000 }; // for an answer
 const PATHS = ['soft', 'webgl'] as const;
@@ -100,44 +100,40 @@ async function quiet(page: Page): Promise<void> {
   await page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null, undefined, PATIENCE);
 }
 
-/**
- * Adds up what the page draws in the moments in question. Where she is to gesture all of the body's
- * recording is played: this person has gestures, but none that is good enough for her answers.
- */
+/** Adds up what the page draws in the moments in question. Where she is to gesture, gesture follows gesture. */
 function sample(page: Page): Promise<void> {
-  return page.evaluate(async (sweep) => {
-    const { rest, fps } = (await (await fetch('bundle/animation.json')).json()) as AnimationInfo;
-    const { stage, conversation, body, director } = window.ico3d!;
-    const { player } = conversation!;
-    const plan = director!.plan.bind(director!);
-    let planned = -1;
-    director!.plan = (utterance, points) => {
-      if (window.watched?.moments !== 'gesturing') plan(utterance, points);
-      else if (utterance !== planned) plan(utterance, Array.from({ length: 10 }, (_, i) => [sweep * i, i % 2 ? Infinity : 0]));
-      planned = utterance;
-    };
-    let before = { now: 0, frames: 0, silence: 0, counts: false };
-    const look = (now: number) => {
+  return page.evaluate(
+    ({ gestures, pace }) => {
+      const { stage, conversation, acting } = window.ico3d!;
+      const { player } = conversation!;
+      let before = { now: 0, frames: 0, silence: 0, counts: false };
+      let made = 0;
+      const look = (now: number) => {
+        requestAnimationFrame(look);
+        const { watched } = window;
+        const heard = player.heard();
+        const counts = heard !== null && !heard.paused;
+        if (counts && watched?.moments === 'gesturing' && now > pace * made) {
+          made = Math.ceil(now / pace);
+          if (!acting!.language.make(gestures[made % gestures.length]!)) throw new Error('she has no such gesture');
+        }
+        const drawn = stage.frames - before.frames;
+        if (watched && counts && before.counts) {
+          watched.seconds += (now - before.now) / 1000;
+          watched.frames += drawn;
+          watched.underrun += Math.max(0, player.underrun - before.silence);
+          watched.gaussians = stage.figures.gaussians;
+          const steps = { evaluate: stage.figures.evaluation, ...(stage.painter as { steps?: object }).steps } as { [step: string]: number };
+          for (const [step, took] of Object.entries(steps)) watched.sums[step] = (watched.sums[step] ?? 0) + drawn * took;
+        }
+        before = { now, frames: stage.frames, silence: player.underrun, counts };
+      };
       requestAnimationFrame(look);
-      const { watched } = window;
-      const { time } = body!; // outside of the rest loop she gestures
-      const heard = player.heard();
-      const counts = heard !== null && !heard.paused && (watched?.moments === 'speaking' || time < rest.start / fps || time > rest.end / fps);
-      const drawn = stage.frames - before.frames;
-      if (watched && counts && before.counts) {
-        watched.seconds += (now - before.now) / 1000;
-        watched.frames += drawn;
-        watched.underrun += Math.max(0, player.underrun - before.silence);
-        watched.gaussians = stage.figures.gaussians;
-        const steps = { evaluate: stage.figures.evaluation, ...(stage.painter as { steps?: object }).steps } as { [step: string]: number };
-        for (const [step, took] of Object.entries(steps)) watched.sums[step] = (watched.sums[step] ?? 0) + drawn * took;
-      }
-      before = { now, frames: stage.frames, silence: player.underrun, counts };
-    };
-    requestAnimationFrame(look);
-    new PerformanceObserver((list) => {
-      const { watched } = window;
-      for (const { duration } of list.getEntries()) if (watched && before.counts) watched.longest = Math.max(watched.longest, duration);
-    }).observe({ type: 'longtask' });
-  }, SWEEP);
+      new PerformanceObserver((list) => {
+        const { watched } = window;
+        for (const { duration } of list.getEntries()) if (watched && before.counts) watched.longest = Math.max(watched.longest, duration);
+      }).observe({ type: 'longtask' });
+    },
+    { gestures: GESTURES, pace: PACE },
+  );
 }
