@@ -51,7 +51,7 @@ def main(
 ) -> None:
     """Writes a PNG of AVATAR: a bundle or, with the capture that it was trained on, a head."""
     gaussians, camera = trained(avatar, capture) if capture else bundled(avatar, size)
-    picture = render(gaussians, [camera], background=torch.ones(3)).rgb[0]
+    picture = render(gaussians, [camera], background=torch.ones(3)).rgb[0]  # (H, W, 3)
     Image.fromarray((picture.clamp(0, 1) * 255).byte().numpy()).save(out)
     print(f"{out}: {len(gaussians)} Gaussians")
 
