@@ -11,7 +11,7 @@ from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError
 from ico3d.measure.body import Truth, evaluate_body, picture_scores
 from ico3d.measure.flicker import border_flicker, masked_difference, novel_cameras
-from ico3d.measure.metrics import moving_pixels, psnr_moving
+from ico3d.measure.part_metrics import moving_pixels, psnr_moving
 from support.bodies.moving_capture import FRAMES, POINTS, MovingCapture
 from support.bodies.true_body import true_body
 

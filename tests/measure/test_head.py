@@ -16,7 +16,7 @@ from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError
 from ico3d.head.views import view_of
 from ico3d.measure.head import evaluate_head, most_frontal_camera
-from ico3d.measure.metrics import mouth_box
+from ico3d.measure.part_metrics import mouth_box
 from ico3d.measure.sync.score import SyncScores
 from ico3d.splat.render import render
 from support.heads.offset_head import ERROR, SIZE, OffsetHead, offset_head

@@ -13,7 +13,7 @@ from ico3d.creating.events import Measured
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import PictureCache, staged
 from ico3d.measure.head import HeadRenderer
-from ico3d.measure.metrics import psnr_mouth
+from ico3d.measure.part_metrics import psnr_mouth
 
 MOST = 40
 """Number of pictures that are compared."""

@@ -18,7 +18,7 @@ from ico3d.capture.pictures import View, train_cameras
 from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
 from ico3d.measure.flicker import border_flicker, novel_cameras
-from ico3d.measure.metrics import moving_pixels, psnr_moving
+from ico3d.measure.part_metrics import moving_pixels, psnr_moving
 from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import PICTURE, Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch

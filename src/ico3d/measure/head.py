@@ -28,7 +28,7 @@ from ico3d.head.views import (
 )
 from ico3d.measure.faces.comparison import METRICS, FaceComparison
 from ico3d.measure.lips import LandmarkReader, landmark_reader
-from ico3d.measure.metrics import psnr_mouth
+from ico3d.measure.part_metrics import psnr_mouth
 from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch

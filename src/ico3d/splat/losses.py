@@ -24,7 +24,7 @@ def ssim(rgb: Tensor, target: Tensor) -> Tensor:
     """Mean structural similarity, differentiable in `rgb` only.
 
     The window is an 11×11 Gaussian with σ = 1.5 pixels. Outside of the picture both images count as
-    0, as is usual in 3DGS. For evaluation by other definitions see `ico3d.measure.metrics`.
+    0, as is usual in 3DGS. For evaluation by other definitions see `ico3d.measure.scores`.
 
     Args:
         rgb: (..., H, W, 3) in [0, 1].

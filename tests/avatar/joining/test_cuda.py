@@ -14,7 +14,7 @@ from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.finding.drawn_head import DrawnHead
 from ico3d.avatar.joining.finding.found_placement import OverRecording, head_poses
 from ico3d.avatar.joining.relight import color_difference, relit
-from ico3d.avatar.joining.seam import seam_scores
+from ico3d.avatar.joining.seam_quality import seam_scores
 from ico3d.capture.face.region import HeadRegion
 from support.avatars.planted_person import FRAMES, PlantedPerson, face, planted_head
 from support.avatars.tiny_joining import assembly_of, parts_of

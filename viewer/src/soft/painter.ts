@@ -2,6 +2,7 @@ import { Matrix4, Vector3, type Object3D, type PerspectiveCamera, type Scene } f
 import type { Easel, MakePainter, Painter } from './contract.ts';
 import type { Drawn, Order } from './band.ts';
 import { Bands } from './bands.ts';
+import { Pulse } from './pulse.ts';
 import type { Cloth, Frame, Placed, Steps } from './rasteriser.ts';
 import type { SoftObject, Source } from './source.ts';
 import { TILE_WIDTH } from './tiles.ts';
@@ -36,7 +37,7 @@ class SoftPainter implements Painter {
   private drawn: Drawn[] = [];
   private frame: Omit<Frame, 'band'> | null = null;
   private waiting: (() => void)[] = []; // those who wait for the picture
-  private request = 0; // of an animation frame
+  private readonly pulse = new Pulse(() => this.busy);
 
   constructor(easel: Easel) {
     this.context = easel.canvas.getContext('2d', { alpha: easel.transparent })!;
@@ -60,13 +61,7 @@ class SoftPainter implements Painter {
   }
 
   loop(frame: ((now: number) => void) | null): void {
-    cancelAnimationFrame(this.request);
-    if (!frame) return;
-    const next = (now: number) => {
-      this.request = requestAnimationFrame(next);
-      frame(now);
-    };
-    this.request = requestAnimationFrame(next);
+    this.pulse.run(frame);
   }
 
   fit(width: number, height: number, ratio: number, share: number): void {
@@ -173,6 +168,7 @@ class SoftPainter implements Painter {
     this.steps = { ...slowest.steps, show: performance.now() - before };
     this.bands.took(this.drawn.map(({ took }) => took));
     for (const resolve of this.waiting.splice(0)) resolve();
+    this.pulse.done();
   }
 }
 

@@ -304,12 +304,12 @@ export class Stage {
   }
 
   /**
-   * One refresh of the screen. Everybody is evaluated for this very picture: that costs less than the
+   * One refresh of the screen, or a picture that missed the last one. Everybody is evaluated for this very picture: that costs less than the
    * drawing by far (`docs/benchmarks.md`), and lips are where the sound is.
    */
   private frame(now: number): void {
     const spares = this.sparing && this.painter.path === 'soft';
-    const step = this.lastFrame && now - this.lastFrame;
+    const step = this.lastFrame && Math.max(0, now - this.lastFrame);
     if (this.painter.busy || (spares && step && step < SPARING)) return;
     this.lastFrame = now;
     if (step && this.drew && !spares && this.quality.picture(step)) this.applyQuality();

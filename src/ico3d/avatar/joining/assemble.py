@@ -22,7 +22,7 @@ from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.finding.found_placement import found_in_pictures
 from ico3d.avatar.joining.relight import color_difference, relit
-from ico3d.avatar.joining.seam import largest_gap, seam_scores
+from ico3d.avatar.joining.seam_quality import largest_gap, seam_scores
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words, moved
 from ico3d.body.settings import BodySettings, Method

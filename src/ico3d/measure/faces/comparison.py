@@ -10,7 +10,7 @@ from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, Face
 from ico3d.measure.faces.blendshapes import blendshape_error
 from ico3d.measure.faces.identity import identity_distances, identity_of
 from ico3d.measure.lips import lip_correlation, lip_gap, lip_lag_ms
-from ico3d.measure.metrics import lmd
+from ico3d.measure.part_metrics import lmd
 
 METRICS = (
     *("lmd", "lip_correlation", "lip_lag_ms", "blendshape_error_lower"),

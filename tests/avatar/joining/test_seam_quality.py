@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ico3d.avatar.avatar import Placement, TrainedAvatar
 from ico3d.avatar.joining.driving import head_poses
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.seam import gap, largest_gap, seam_scores
+from ico3d.avatar.joining.seam_quality import gap, largest_gap, seam_scores
 from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import CaptureError
 from ico3d.splat.gaussians import Gaussians

@@ -1,4 +1,4 @@
-"""Picture metrics, each defined once (docs/architecture.md, "Metrics")."""
+"""Metrics of parts of a picture: motion, mouth, landmarks (docs/architecture.md, "Metrics")."""
 
 from collections.abc import Sequence
 

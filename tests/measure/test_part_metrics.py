@@ -5,7 +5,7 @@ import pytest
 
 from ico3d.common.psnr import psnr
 from ico3d.measure.lips import lip_correlation, lip_gap, lip_lag_ms
-from ico3d.measure.metrics import lmd, mouth_box, psnr_mouth
+from ico3d.measure.part_metrics import lmd, mouth_box, psnr_mouth
 
 
 def test_psnr_of_a_constant_error():
