@@ -50,10 +50,15 @@ test.skipIf(!existsSync(DEMO))(`voice to voice over ${TURNS} turns, drawing and 
   await browser.close();
   await server.stop();
 
-  const times = (drawing: boolean) => turns.filter(({ asked }) => changes.findLast(({ at }) => at < asked)?.drawing === drawing).map(({ parts }) => parts['voice to voice']!);
+  const half = (drawing: boolean) => turns.filter(({ asked }) => changes.findLast(({ at }) => at < asked)?.drawing === drawing);
+  const times = (drawing: boolean, part = 'voice to voice') => half(drawing).map(({ parts }) => parts[part]!);
   const [drawn, still] = [times(true), times(false)];
-  const row = (name: string, list: number[]) => `| ${name} | ${list.length} | ${quantile(list, 0.5)?.toFixed(0)} | ${quantile(list, 0.95)?.toFixed(0)} |`;
-  console.log([row('standing still', still), row('drawn', drawn)].join('\n'));
+  const ms = (list: number[], share: number) => quantile(list, share)?.toFixed(0);
+  const row = (name: string, drawing: boolean) => {
+    const middles = ['question’s end to speech message', 'speech message to sound'].map((part) => ms(times(drawing, part), 0.5));
+    return `| ${[name, half(drawing).length, ...middles, ms(times(drawing), 0.5), ms(times(drawing), 0.95)].join(' | ')} |`;
+  };
+  console.log([row('standing still', false), row('drawn', true)].join('\n'));
   expect(Math.min(drawn.length, still.length)).toBeGreaterThan(TURNS / 3);
   expect(quantile(drawn, 0.5)).toBeLessThan(MOST * quantile(still, 0.5));
 });

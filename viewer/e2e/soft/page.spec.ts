@@ -164,7 +164,7 @@ describe('a page that draws without WebGL', () => {
   });
 
   test('leaves the processor to whoever works out an answer', async () => {
-    const most = 11; // pictures in a second, of which one may have been begun before
+    const most = 8; // pictures in a second, of which one may have been begun before
     const drawn = await page.evaluate(async () => {
       const { stage } = window.ico3d!;
       stage.spare(true);

@@ -21,7 +21,7 @@ import { groundOf, person, wholeBody } from './camera/subject.ts';
 
 const MOST_PIXELS = 2; // along a side, for one of the page
 const REST = 0.1; // s without a change after which a picture is at rest
-const SPARING = 0.095; // s from picture to picture at least, where the processor that draws is needed elsewhere
+const SPARING = 0.145; // s from picture to picture at least, where the processor that draws is needed elsewhere
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 
 /** Canvas, camera and actors: draws what changed and nothing else, and nothing while nobody can see it. */
