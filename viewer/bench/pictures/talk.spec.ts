@@ -130,8 +130,9 @@ async function noPicture(album: Album): Promise<void> {
   const browser = await arrive(demoUrl!, { ...SIZE, draw: 'webgl' });
   const { page } = browser;
   await page.evaluate(() => window.ico3d!.stage.renderer.getContext().getExtension('WEBGL_lose_context')!.loseContext());
-  await page.waitForFunction(() => window.ico3d!.stage.painter.path === 'soft' && document.querySelectorAll('.picture').length === 1);
+  await page.waitForFunction(() => window.ico3d!.stage.painter.path === 'soft' && window.ico3d!.stage.figures.gaussians > 0);
   await page.click('#panel-button');
+  await page.waitForFunction(() => document.querySelector('#panel')!.textContent!.includes('the processor'));
   await album.shoot(page, 'The browser took WebGL away for good: the processor draws');
   await browser.close();
 }
