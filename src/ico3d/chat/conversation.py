@@ -7,6 +7,7 @@ from functools import singledispatchmethod
 
 import numpy as np
 from loguru import logger
+from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
@@ -42,7 +43,8 @@ from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.allowance import Allowance
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
-from ico3d.chat.tools import functions
+from ico3d.chat.tools import extended, functions
+from ico3d.chat.tools.mcp import Connections
 from ico3d.chat.turns.detector import VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
@@ -98,6 +100,7 @@ class Conversation:
         self.activity = Activity(now)
         self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
         self._context = LLMContext()
+        self._servers = Connections(avatar.settings.mcp, self._offered)
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page)
@@ -138,6 +141,7 @@ class Conversation:
         await runner.add_workers(self._worker)
         self._task = asyncio.create_task(runner.run())
         self._task.add_done_callback(self._stopped)
+        self._servers.open()
         return parts
 
     async def close(self) -> None:
@@ -146,7 +150,7 @@ class Conversation:
             return
         self._task.remove_done_callback(self._stopped)
         await self._worker.cancel()
-        await asyncio.gather(self._task, return_exceptions=True)
+        await asyncio.gather(self._task, self._servers.close(), return_exceptions=True)
 
     async def greet(self) -> None:
         """Says the persona's greeting."""
@@ -329,6 +333,9 @@ class Conversation:
         settings = self._avatar.settings
         moods = face.moods if self._avatar.head.eye_offset is not None else None
         return functions(language, self._gestures, moods, settings.tools, settings.allow)
+
+    def _offered(self, found: list[FunctionSchema]) -> None:
+        self._context.set_tools(extended(self._context.tools, found))
 
     def _prepare_voice(self, voice: FrameProcessor) -> None:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""

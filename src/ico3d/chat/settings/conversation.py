@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 from ico3d.chat.settings.embedding import Embedding
 from ico3d.chat.settings.keys import check_key
+from ico3d.chat.settings.mcp import McpServer, check_servers
 from ico3d.chat.settings.tools import Tool, check_tools
 from ico3d.chat.settings.visits import Visits
 from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
@@ -173,6 +174,7 @@ class ChatSettings:
         limits: How much visitors may take.
         embedding: Who may put the avatar into their pages ([more](conversation/embedding.md)).
         tools: Functions over HTTP that the language model may call.
+        mcp: Servers of the Model Context Protocol, whose functions it may call, too.
         allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
             addresses must be listed as such.
     """
@@ -190,19 +192,21 @@ class ChatSettings:
     limits: Visits = Visits()
     embedding: Embedding = Embedding()
     tools: tuple[Tool, ...] = ()
+    mcp: tuple[McpServer, ...] = ()
     allow: tuple[str, ...] = ()
 
     def __post_init__(self):
         """Checks ranges.
 
         Raises:
-            SettingsError: If the limits of sessions make no sense, or a tool does not.
+            SettingsError: If the limits of sessions make no sense, or a tool or server does not.
         """
         if self.max_sessions < 1:
             raise SettingsError("chat settings: max_sessions must be at least 1.")
         if not 0 <= self.idle_minutes < math.inf:
             raise SettingsError("chat settings: idle_minutes must be 0 (never) or more.")
         check_tools(self.tools, self.allow)
+        check_servers(self.mcp, self.allow)
 
 
 def read_settings(path: Path | None) -> ChatSettings:
