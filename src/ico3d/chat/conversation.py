@@ -41,6 +41,7 @@ from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.allowance import Allowance
+from ico3d.chat.supervision.filler import Filler
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
 from ico3d.chat.tools import extended, functions
@@ -294,6 +295,7 @@ class Conversation:
                     self._apology_language(),
                     settings.limits.answer_letters,
                 ),
+                Filler(settings.patience.tool, self._apology_language()),
                 ClauseProcessor(self._language()),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, run, self._made),

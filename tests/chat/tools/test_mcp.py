@@ -3,7 +3,9 @@
 import asyncio
 import contextlib
 import json
+import re
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -12,13 +14,17 @@ from fastapi.responses import RedirectResponse
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN
 
+from ico3d.chat import conversation
 from ico3d.chat.settings.conversation import read_settings
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools import check_ready, extended
 from ico3d.chat.tools.mcp import Connection, Connections
 from ico3d.errors import MissingExtraError, SettingsError
 from support.chat.mcp_server import COMMAND, museum
-from support.chat.scripted_server import running
+from support.chat.scripted_server import Call, Script, running
+from support.chat.scripted_talk import ask, roles, talking
+
+pytestmark = pytest.mark.slow
 
 FILE = """
 allow = ["mcp.example.org"]
@@ -49,6 +55,15 @@ def test_a_settings_file_names_servers(tmp_path):
     assert online.functions == ("opening_hours",) and online.seconds == 10
     assert program.command == ("files-server", "--read-only") and program.seconds == 5
     assert program.secrets == {"FILES_KEY": "$FILES_KEY"}
+
+
+def test_the_documentation_shows_settings_that_are_read(tmp_path):
+    page = Path(__file__).parents[3] / "docs" / "conversation" / "tools.md"
+    blocks = re.findall(r"^```toml\n(.*?)^```$", page.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    path = tmp_path / "chat.toml"
+    found = [read_settings(path) for block in blocks if path.write_text(block, "utf-8")]
+    assert [tool.headers for read in found for tool in read.tools] == [found[1].mcp[0].headers]
+    assert [server.name for read in found for server in read.mcp] == ["museum", "files"]
 
 
 @pytest.mark.parametrize(
@@ -140,11 +155,11 @@ async def asked(function, **arguments):
     [
         (("/nowhere/at/all",), "No such file"),
         (("true",), "Connection closed"),
-        (("sleep", "60"), "within 0.2 seconds"),
+        ((sys.executable, "-c", "import sys; sys.stdin.read()"), "within 0.2 seconds"),
     ],
 )
 async def test_a_program_that_is_none_is_one_sentence(sdk, command, complaint):
-    connection = Connection(McpServer("none", command, seconds=0.2 if "60" in command else 20))
+    connection = Connection(McpServer("none", command, seconds=0.2 if "-c" in command else 20))
     result = await connection.call("any", {})
     await connection.close()
     assert result["error"].startswith("any failed: ") and complaint in result["error"]
@@ -198,11 +213,37 @@ async def test_a_key_goes_to_its_server_alone(sdk, monkeypatch):
 @pytest.mark.real_time
 async def test_what_takes_too_long_is_given_up(sdk):
     async with online() as (url, _, _):
-        connection = Connection(McpServer("m", url=url, seconds=1))
+        connection = Connection(McpServer("m", url=url, seconds=0.5))
         late = await connection.call("slow", {})
-        assert late == {"error": "slow failed: it did not answer within 1 seconds."}
+        assert late == {"error": "slow failed: it did not answer within 0.5 seconds."}
         assert "result" in await connection.call("opening_hours", {"day": "Monday"})
         await connection.close()
     gone = Connection(McpServer("m", url="http://127.0.0.1:1/mcp"))
     assert "attempts failed" in (await gone.call("opening_hours", {}))["error"]
     await gone.close()
+
+
+@pytest.mark.real_time
+async def test_the_model_calls_a_server_and_says_what_it_answered(sdk, bundle, monkeypatch):
+    offered = asyncio.Event()
+
+    def noted(*given):
+        offered.set()
+        return extended(*given)
+
+    def answer(body):
+        if roles(body)[-1] == "tool":
+            return [json.loads(body["messages"][-1]["content"])["result"]]
+        return [Call("museum_opening_hours", {"day": "Monday"})]
+
+    script = Script(answer)
+    monkeypatch.setattr(conversation, "extended", noted)
+    async with online() as (url, _, _):
+        host = url.split("/")[2]
+        museum = McpServer("museum", url=url, functions=("opening_hours", "slow"))
+        nothing = McpServer("nothing", ("/nowhere/at/all",))
+        async with talking(bundle, script, mcp=(museum, nothing), allow=(host,)) as page:
+            await offered.wait()
+            assert await ask(page, "When is it open?", 0) == ["On Monday from ten to six."]
+    names = [tool["function"]["name"] for tool in script.requests[0]["tools"]]
+    assert names == ["mood", "museum_opening_hours", "museum_slow"]

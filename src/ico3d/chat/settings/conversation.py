@@ -73,13 +73,15 @@ class Turns:
 
 @dataclass(frozen=True)
 class Patience:
-    """How long services may take before the avatar apologises: the table `[patience]`.
+    """How long services may take before the avatar says something: the table `[patience]`.
 
     Attributes:
         language: Seconds until the first words of an answer, and between two pieces of it.
         reasoning: Seconds that a model may think before the first words, as long as it shows that
             it is thinking.
         voice: Seconds until the first sound of a sentence, and between two pieces of it.
+        tool: Seconds that a tool may take before the avatar says that it is looking, once in an
+            answer; 0 for never.
         apologies: Language in which the avatar apologises, such as `de`; empty for the persona's
             first language. English for languages without apologies.
     """
@@ -87,6 +89,7 @@ class Patience:
     language: float = 12.0
     reasoning: float = 60.0
     voice: float = 8.0
+    tool: float = 1.0
     apologies: str = ""
 
     def __post_init__(self):
@@ -97,6 +100,8 @@ class Patience:
         """
         if min(self.language, self.reasoning, self.voice) < 0.1:
             raise SettingsError("chat settings: [patience] needs at least 0.1 seconds for each.")
+        if self.tool < 0:
+            raise SettingsError("chat settings: [patience] tool must be 0 (never) or more.")
 
 
 @dataclass(frozen=True)

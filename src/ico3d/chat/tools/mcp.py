@@ -1,15 +1,16 @@
 """Functions of MCP servers, of which each visitor has connections of their own.
 
-So a server that remembers its client cannot mix visitors up. Whatever fails becomes one sentence for
-the model, and the next call connects anew.
+So a server that remembers its client cannot mix visitors up. Whatever fails becomes one sentence
+for the model, and the next call connects anew.
 """
 
 import asyncio
 import os
 import re
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loguru import logger
@@ -153,6 +154,7 @@ class Connection:
     async def _hold(self, line: _Line) -> None:
         """Holds a line from its beginning to its end, which have to be in one task."""
         try:
+            opened = over_http if self.server.url else as_program
             async with opened(self.server) as client:
                 line.opened.set_result(client)
                 await line.closing.wait()
@@ -166,36 +168,45 @@ class Connection:
 
 
 @asynccontextmanager
-async def opened(server: McpServer) -> AsyncIterator["Client"]:
-    """A client that is connected to a server.
+async def over_http(server: McpServer) -> AsyncIterator["Client"]:
+    """A client of a server at an address.
 
-    Redirects stay at the server's own address, as the SDK has it; nothing goes through a proxy.
+    Redirects stay there, as the SDK has it, and nothing goes through a proxy.
 
     Raises:
         SettingsError: If an environment variable is not set.
-        Exception: If the server does not start, or cannot be reached.
+        Exception: If the server cannot be reached.
+    """
+    import httpx2
+    from mcp import Client
+    from mcp.client.streamable_http import streamable_http_client
+
+    headers = filled_in(server.headers, server.where)
+    limits = httpx2.Timeout(server.seconds, read=None)  # a stream is silent between calls
+    async with (
+        httpx2.AsyncClient(headers=headers, timeout=limits, trust_env=False) as http,
+        Client(streamable_http_client(server.url, http_client=http)) as client,
+    ):
+        yield client
+
+
+@asynccontextmanager
+async def as_program(server: McpServer) -> AsyncIterator["Client"]:
+    """A client of a server that is a program, which runs as long.
+
+    Raises:
+        SettingsError: If an environment variable is not set.
+        Exception: If the program does not start.
     """
     from mcp import Client, StdioServerParameters
     from mcp.client.stdio import stdio_client
-    from mcp.client.streamable_http import streamable_http_client
 
-    filled = filled_in(server.secrets, server.where)
-    async with AsyncExitStack() as stack:
-        if server.url:
-            import httpx2
-
-            limits = httpx2.Timeout(server.seconds, read=None)  # a stream is silent between calls
-            http = httpx2.AsyncClient(headers=filled, timeout=limits, trust_env=False)
-            transport = streamable_http_client(
-                server.url, http_client=await stack.enter_async_context(http)
-            )
-        else:
-            program, *arguments = server.command
-            parameters = StdioServerParameters(command=program, args=arguments, env=filled)
-            # what a program says there may quote visitors and keys
-            nowhere = stack.enter_context(open(os.devnull, "w"))
-            transport = stdio_client(parameters, errlog=nowhere)
-        yield await stack.enter_async_context(Client(transport))
+    environment = filled_in(server.environment, server.where)
+    command, *arguments = server.command
+    parameters = StdioServerParameters(command=command, args=arguments, env=environment)
+    with Path(os.devnull).open("w") as nowhere:  # what it says there may quote visitors and keys
+        async with Client(stdio_client(parameters, errlog=nowhere)) as client:
+            yield client
 
 
 def text_of(result: "CallToolResult") -> str:
