@@ -1,6 +1,6 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 
-export const VERSION = 7;
+export const VERSION = 8;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
@@ -105,6 +105,13 @@ export interface HelloMessage {
   wishes: Record<string, string>;
 }
 
+/** What the visitor said in earlier visits, as the browser kept it; once in a new session. Sent only by pages whose visitor agreed; servers refuse it unless `welcome` has `remembers`. */
+export interface NotesMessage {
+  type: "notes";
+  /** The visitor's own sentences, the oldest first. */
+  texts: string[];
+}
+
 /** Sound from the microphone (binary). */
 export interface AudioMessage {
   type: "audio";
@@ -192,6 +199,8 @@ export interface WelcomeMessage {
   dictation: Dictation | null;
   /** Services to choose from; empty where strangers may be talking. */
   offers: Offer[];
+  /** Whether the language model takes `notes` of earlier visits. */
+  remembers: boolean;
 }
 
 /** All places are taken: the page is in a queue, and `welcome` follows when it is its turn. */
@@ -354,6 +363,7 @@ export interface ErrorMessage {
 
 export type ClientMessage =
   | HelloMessage
+  | NotesMessage
   | AudioMessage
   | TextMessage
   | SayMessage

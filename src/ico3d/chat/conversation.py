@@ -25,7 +25,7 @@ from pipecat.workers.runner import WorkerRunner
 from ico3d.chat.activity import Activity
 from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.listener import Captions, PageInput
-from ico3d.chat.memory import forget, remembering
+from ico3d.chat.memory import forget, recall, remembering, remembers_visits
 from ico3d.chat.observing.monitor import Visitor
 from ico3d.chat.observing.timing import PipelineClock, TurnObserver
 from ico3d.chat.page import Page
@@ -62,6 +62,7 @@ from ico3d.chat.wire.protocol import (
     Heard,
     Hello,
     Interrupt,
+    Notes,
     Say,
     Talk,
     Text,
@@ -112,6 +113,9 @@ class Conversation:
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
         self._dictates = False  # whether the browser recognises speech
+        self.remembers = False
+        """Whether the page may tell of earlier visits; known once it has started."""
+        self._recalled = False  # it has told
 
     async def start(self) -> Parts:
         """Builds and starts the pipeline, which takes about 0.5 s, mostly in a thread.
@@ -124,6 +128,7 @@ class Conversation:
         """
         parts = await make_aside(self._avatar)
         self._dictates = parts.dictation is not None
+        self.remembers = remembers_visits(self._avatar.settings.memory, parts.language)
         self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
@@ -170,6 +175,15 @@ class Conversation:
     @handle.register
     async def _hello(self, _: Hello) -> None:
         raise ProtocolError("hello comes only once.")
+
+    @handle.register
+    async def _notes(self, message: Notes) -> None:
+        if not self.remembers:
+            raise ProtocolError("notes: this server's settings do not allow it.")
+        if self._recalled:
+            raise ProtocolError("notes come only once.")
+        self._recalled = True
+        recall(self._context, message.texts)
 
     @handle.register
     async def _audio(self, message: Audio) -> None:

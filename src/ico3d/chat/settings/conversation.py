@@ -145,9 +145,12 @@ class Memory:
     Attributes:
         tokens: Approximate length of the conversation, without the system instruction, beyond which
             all but the latest messages are summarised.
+        visits: Whether pages may remember visitors who agree: what they said is kept in their own
+            browsers, and told to the language model at their next visit.
     """
 
     tokens: int = 4000
+    visits: bool = False
 
     def __post_init__(self):
         """Checks ranges.
