@@ -5,12 +5,7 @@ export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second
-export const MAX_TEXT_FRAME = 16384; // bytes
-export const MAX_BINARY_FRAME = 65536; // bytes
-export const MAX_RATE = 100; // messages per second
-export const MAX_BURST = 200; // messages
 export const RESUME_SECONDS = 30;
-export const MAX_AHEAD_SECONDS = 2;
 
 /** A matrix in row order. */
 export interface Matrix {
