@@ -27,10 +27,8 @@ afterAll(() => browser?.close());
 /** A visit, until the greeting. */
 async function visit(): Promise<void> {
   const { page } = browser;
-  await page.goto(drawnBy('soft', talkingUrl));
-  await page.waitForSelector('#choices:visible', { timeout: 60_000 });
+  await browser.open(drawnBy('soft', talkingUrl));
   await pauseDrawing(page);
-  await page.click('#start-typing');
   await page.waitForFunction(() => document.querySelector('#answer')!.textContent === 'Hello.');
 }
 
