@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import os
 import re
 import sys
 from pathlib import Path
@@ -134,7 +135,10 @@ async def test_a_program_is_started_and_its_functions_called(sdk, monkeypatch):
     assert complaint.startswith("opening_hours failed: ") and "\n" not in complaint
     assert "Connection closed" in (await asked(functions["museum_leave"]))["error"]
     assert "result" in await asked(hours, day="Tuesday"), "it was started again"
+    process = int((await asked(functions["museum_process"]))["result"])
     await visit.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
 
 
 async def asked(function, **arguments):

@@ -27,6 +27,11 @@ def museum():
         return f"{os.environ.get('MUSEUM_KEY')} {os.environ.get('OPENAI_API_KEY')}"
 
     @server.tool()
+    def process() -> str:
+        """Number of the program."""
+        return str(os.getpid())
+
+    @server.tool()
     def big() -> str:
         """A long answer."""
         return "x" * 20_000

@@ -80,7 +80,7 @@ class Patience:
         reasoning: Seconds that a model may think before the first words, as long as it shows that
             it is thinking.
         voice: Seconds until the first sound of a sentence, and between two pieces of it.
-        tool: Seconds that a tool may take before the avatar says that it is looking, once in an
+        tool: Seconds that a tool may take before the avatar asks for a moment, once in an
             answer; 0 for never.
         apologies: Language in which the avatar apologises, such as `de`; empty for the persona's
             first language. English for languages without apologies.

@@ -66,19 +66,19 @@ APOLOGIES: dict[str, dict[Failed, str]] = {
 """Apologies by language (ISO 639-1) and failed service."""
 
 WAITING = {
-    "en": "One moment, I am looking that up.",
-    "de": "Einen Moment, ich sehe nach.",
-    "fr": "Un instant, je regarde.",
-    "es": "Un momento, lo estoy mirando.",
-    "it": "Un momento, sto guardando.",
-    "pt": "Um momento, estou a ver.",
-    "ru": "Минуту, я сейчас посмотрю.",
-    "zh": "请稍等,我查一下。",
-    "ja": "少々お待ちください、調べています。",
-    "ko": "잠시만요, 찾아볼게요.",
-    "ar": "لحظة من فضلك، أنا أبحث عن ذلك.",
+    "en": "One moment, please.",
+    "de": "Einen Moment, bitte.",
+    "fr": "Un instant, s'il vous plaît.",
+    "es": "Un momento, por favor.",
+    "it": "Un momento, per favore.",
+    "pt": "Um momento, por favor.",
+    "ru": "Одну минуту.",
+    "zh": "请稍等。",
+    "ja": "少々お待ちください。",
+    "ko": "잠시만요.",
+    "ar": "لحظة من فضلك.",
 }
-"""By language, what is said while a tool works."""
+"""By language, what is said while a tool works: short, as the answer is asked for behind it."""
 
 
 def apology(failed: Failed, language: str) -> str:
