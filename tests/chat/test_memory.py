@@ -1,17 +1,24 @@
-"""What is kept of a long talk is bounded, whether summaries are made of it or not."""
+"""What is kept of a long talk is bounded, summaries or none, and what is told of earlier visits."""
 
 import asyncio
+import json
 from dataclasses import replace
 
 import pytest
 from pipecat.processors.aggregators.llm_context import LLMContext
 
-from ico3d.chat.memory import forget
+from ico3d.chat.memory import NOTES, forget, recall
 from ico3d.chat.services import choose
 from ico3d.chat.settings.conversation import ChatSettings, Choice, Memory
-from ico3d.chat.wire.protocol import Text
+from ico3d.chat.wire.codec import decode_client
+from ico3d.chat.wire.protocol import Error, Notes, Text, Welcome
+from ico3d.errors import ProtocolError
+from ico3d.measure.talking.page import open_page
 from ico3d.measure.talking.scripted import Script
+from support.chat import scripted_server
 from support.chat.guests import Guest, open_sessions
+from support.chat.scripted_talk import ask, talking
+from support.chat.serving import TYPED, serving
 from support.chat.virtual_time import run
 
 SMALL = Memory(tokens=200)
@@ -75,3 +82,50 @@ def test_a_long_talk_is_kept_in_bounds(bundle, notes):
 
     sizes = run(chat())
     assert max(sizes) <= 10 and min(sizes[5:]) >= 2
+
+
+VISITS = Memory(visits=True)
+TOLD = "“My name is Grace.” “I like old clocks.”"
+EARLIER = ["My name is Grace.", "I like\nold  clocks.\x00", " \t"]
+
+
+async def test_what_was_said_in_earlier_visits_is_told_as_the_visitors_own_words(bundle):
+    script = scripted_server.Script(lambda body: ["Hello, Grace!"])
+    async with talking(bundle, script, memory=VISITS) as page:
+        assert page.messages(Welcome)[0].remembers
+        await page.send(Notes(EARLIER))
+        assert await ask(page, "Do you remember me?", 0) == ["Hello, Grace!"]
+        await page.send(Notes(["I am somebody else."]))
+        _, error = await page.wait(Error)
+    assert "only once" in error.message
+    system, earlier, question = script.requests[0]["messages"]
+    assert "Grace" not in system["content"], "nobody's notes are instructions"
+    assert earlier == {"role": "user", "content": NOTES.format(notes=TOLD)}
+    assert question["content"] == "Do you remember me?"
+
+
+@pytest.mark.parametrize("texts", [[], [""], ["  "], 16 * ["x"], 17 * ["x"], ["x" * 201], [3]])
+def test_pages_cannot_send_more_than_a_few_sentences(texts):
+    frame = json.dumps({"type": "notes", "texts": texts})
+    if texts in ([], ["  "], 16 * ["x"]):
+        context = LLMContext()
+        recall(context, decode_client(frame).texts)
+        assert len(context.messages) == (1 if "x" in texts else 0)
+    else:
+        with pytest.raises(ProtocolError, match=r"notes\.texts"):
+            decode_client(frame)
+
+
+@pytest.mark.parametrize(("memory", "language"), [(Memory(), "openai"), (VISITS, "persona-notes")])
+async def test_nothing_is_taken_unless_the_settings_allow_it_and_the_model_reads_it(
+    bundle, memory, language
+):
+    options = {"url": "http://127.0.0.1:9/v1", "model": "tiny"} if language == "openai" else {}
+    settings = replace(TYPED, memory=memory, language=Choice(language, options))
+    async with serving(bundle, settings) as (url, _):
+        page, welcome = await open_page(url, microphone=False)
+        assert not welcome.remembers
+        await page.send(Notes(["My name is Grace."]))
+        _, error = await page.wait(Error)
+        assert "do not allow it" in error.message
+        await page.close()

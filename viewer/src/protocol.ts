@@ -1,16 +1,11 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 
-export const VERSION = 7;
+export const VERSION = 8;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second
-export const MAX_TEXT_FRAME = 16384; // bytes
-export const MAX_BINARY_FRAME = 65536; // bytes
-export const MAX_RATE = 100; // messages per second
-export const MAX_BURST = 200; // messages
 export const RESUME_SECONDS = 30;
-export const MAX_AHEAD_SECONDS = 2;
 
 /** A matrix in row order. */
 export interface Matrix {
@@ -105,6 +100,13 @@ export interface HelloMessage {
   wishes: Record<string, string>;
 }
 
+/** What the visitor said in earlier visits, as the browser kept it; once in a new session. Sent only by pages whose visitor agreed; servers refuse it unless `welcome` has `remembers`. */
+export interface NotesMessage {
+  type: "notes";
+  /** The visitor's own sentences, the oldest first. */
+  texts: string[];
+}
+
 /** Sound from the microphone (binary). */
 export interface AudioMessage {
   type: "audio";
@@ -192,6 +194,8 @@ export interface WelcomeMessage {
   dictation: Dictation | null;
   /** Services to choose from; empty where strangers may be talking. */
   offers: Offer[];
+  /** Whether the language model takes `notes` of earlier visits. */
+  remembers: boolean;
 }
 
 /** All places are taken: the page is in a queue, and `welcome` follows when it is its turn. */
@@ -354,6 +358,7 @@ export interface ErrorMessage {
 
 export type ClientMessage =
   | HelloMessage
+  | NotesMessage
   | AudioMessage
   | TextMessage
   | SayMessage

@@ -15,3 +15,12 @@ export function remember(key: string, value: string): void {
     // It holds until the page is left.
   }
 }
+
+/** Keeps nothing under a name any more. */
+export function forget(key: string): void {
+  try {
+    localStorage.removeItem(`ico3d-${key}`);
+  } catch {
+    // Where nothing is kept there is nothing to forget.
+  }
+}

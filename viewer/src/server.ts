@@ -26,6 +26,11 @@ export class Server {
     return new URL('token', this.base).href;
   }
 
+  /** Address by which a browser tells this server from others; without what admits to it. */
+  home(): string {
+    return this.base.origin + this.base.pathname;
+  }
+
   /** Address of the page that checks the visitor's device. */
   check(): string {
     return new URL('check', this.base).href;

@@ -129,7 +129,7 @@ export class Visit {
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
-    const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '' }, this.overlay, () => stage.figures, signal);
+    const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '', home: server.home() }, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };
     const corner = root.querySelector<HTMLElement>('.figures')!;

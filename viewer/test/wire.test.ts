@@ -23,6 +23,7 @@ test('frames of the server mean here what they meant there', () => {
     notices: [{ code: 'still-lips', text: 'No speech in this avatar, sagt sie – schade.' }],
     dictation: { language: 'de-DE', fallback: null },
     offers: [{ kind: 'voice', key: 'a', name: 'A', hindrance: 'install it.' }],
+    remembers: true,
   });
   expect(text('1.json')).toEqual({ type: 'state', state: 'thinking' });
   const speech = decode(arrayBuffer(readFileSync(join(folder, '2.bin')))) as SpeechMessage;

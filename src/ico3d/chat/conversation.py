@@ -7,6 +7,7 @@ from functools import singledispatchmethod
 
 import numpy as np
 from loguru import logger
+from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
@@ -24,7 +25,7 @@ from pipecat.workers.runner import WorkerRunner
 from ico3d.chat.activity import Activity
 from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.listener import Captions, PageInput
-from ico3d.chat.memory import forget, remembering
+from ico3d.chat.memory import forget, recall, remembering, remembers_visits
 from ico3d.chat.observing.monitor import Visitor
 from ico3d.chat.observing.timing import PipelineClock, TurnObserver
 from ico3d.chat.page import Page
@@ -40,9 +41,11 @@ from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.allowance import Allowance
+from ico3d.chat.supervision.filler import Filler
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
-from ico3d.chat.tools import functions
+from ico3d.chat.tools import extended, functions
+from ico3d.chat.tools.mcp import Connections
 from ico3d.chat.turns.detector import VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
@@ -59,6 +62,7 @@ from ico3d.chat.wire.protocol import (
     Heard,
     Hello,
     Interrupt,
+    Notes,
     Say,
     Talk,
     Text,
@@ -98,6 +102,7 @@ class Conversation:
         self.activity = Activity(now)
         self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
         self._context = LLMContext()
+        self._servers = Connections(avatar.settings.mcp, self._offered)
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page)
@@ -108,6 +113,9 @@ class Conversation:
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
         self._dictates = False  # whether the browser recognises speech
+        self.remembers = False
+        """Whether the page may tell of earlier visits; known once it has started."""
+        self._recalled = False  # it has told
 
     async def start(self) -> Parts:
         """Builds and starts the pipeline, which takes about 0.5 s, mostly in a thread.
@@ -120,6 +128,7 @@ class Conversation:
         """
         parts = await make_aside(self._avatar)
         self._dictates = parts.dictation is not None
+        self.remembers = remembers_visits(self._avatar.settings.memory, parts.language)
         self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
@@ -138,6 +147,7 @@ class Conversation:
         await runner.add_workers(self._worker)
         self._task = asyncio.create_task(runner.run())
         self._task.add_done_callback(self._stopped)
+        self._servers.open()
         return parts
 
     async def close(self) -> None:
@@ -146,7 +156,7 @@ class Conversation:
             return
         self._task.remove_done_callback(self._stopped)
         await self._worker.cancel()
-        await asyncio.gather(self._task, return_exceptions=True)
+        await asyncio.gather(self._task, self._servers.close(), return_exceptions=True)
 
     async def greet(self) -> None:
         """Says the persona's greeting."""
@@ -165,6 +175,15 @@ class Conversation:
     @handle.register
     async def _hello(self, _: Hello) -> None:
         raise ProtocolError("hello comes only once.")
+
+    @handle.register
+    async def _notes(self, message: Notes) -> None:
+        if not self.remembers:
+            raise ProtocolError("notes: this server's settings do not allow it.")
+        if self._recalled:
+            raise ProtocolError("notes come only once.")
+        self._recalled = True
+        recall(self._context, message.texts)
 
     @handle.register
     async def _audio(self, message: Audio) -> None:
@@ -290,6 +309,7 @@ class Conversation:
                     self._apology_language(),
                     settings.limits.answer_letters,
                 ),
+                Filler(settings.patience.tool, self._apology_language()),
                 ClauseProcessor(self._language()),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, run, self._made),
@@ -329,6 +349,9 @@ class Conversation:
         settings = self._avatar.settings
         moods = face.moods if self._avatar.head.eye_offset is not None else None
         return functions(language, self._gestures, moods, settings.tools, settings.allow)
+
+    def _offered(self, found: list[FunctionSchema]) -> None:
+        self._context.set_tools(extended(self._context.tools, found))
 
     def _prepare_voice(self, voice: FrameProcessor) -> None:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""

@@ -1,4 +1,9 @@
-"""Limits what a language model remembers: the latest messages and a summary of the rest."""
+"""What a language model remembers: the latest messages, a summary of the rest, and earlier visits.
+
+Of earlier visits it knows the visitor's own sentences, which only the visitor's browser keeps.
+"""
+
+from collections.abc import Sequence
 
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.processors.aggregators.llm_response_universal import LLMAssistantAggregatorParams
@@ -24,6 +29,7 @@ PROMPT = (
     "but the summary."
 )
 REMINDER = "(What we talked about before, in short: {summary})"
+NOTES = "(From my earlier visits, in my own words: {notes})"
 
 
 def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggregatorParams:
@@ -73,3 +79,25 @@ def is_question(message: object) -> bool:
     Only there may a conversation be cut: elsewhere a tool's call could lose its result.
     """
     return isinstance(message, dict) and message.get("role") == "user"
+
+
+def remembers_visits(memory: Memory, language: FrameProcessor) -> bool:
+    """Whether notes of earlier visits are of use: the persona's notes answer without them."""
+    return memory.visits and isinstance(language, LLMService)
+
+
+def recall(context: LLMContext, notes: Sequence[str]) -> None:
+    """Tells a language model what the visitor said in earlier visits.
+
+    They are the visitor's words and no more: a page can put nothing into them that a question could
+    not hold.
+
+    Args:
+        context: Context of the language model.
+        notes: The visitor's sentences, as a page sent them.
+    """
+    plain = ["".join(c if c.isprintable() else " " for c in note) for note in notes]
+    told = [" ".join(note.split()) for note in plain]
+    if any(told):
+        listed = " ".join(f"“{note}”" for note in told if note)
+        context.add_message({"role": "user", "content": NOTES.format(notes=listed)})

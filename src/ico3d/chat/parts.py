@@ -20,6 +20,7 @@ from ico3d.chat.observing.failures import cause
 from ico3d.chat.services import Chosen, ChosenService
 from ico3d.chat.services.provider import Context, WarmsUp
 from ico3d.chat.settings.conversation import ChatSettings
+from ico3d.chat.tools import check_ready
 from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.wire import protocol
@@ -89,8 +90,9 @@ def make_parts(avatar: Avatar) -> Parts:
     """Creates the components of one session, and loads what they share with other sessions.
 
     Raises:
-        Ico3dError: If a service cannot be created.
+        Ico3dError: If a service cannot be created, or a tool lacks its key or package.
     """
+    check_ready(avatar.settings.tools, avatar.settings.mcp)
     turns, services = avatar.settings.turns, avatar.services
     shown = Takes(avatar.clips or {}).meanings if avatar.settings.gestures else []
     context = Context(avatar.persona, avatar.head, avatar.animation, tuple(shown))

@@ -171,7 +171,7 @@ class Speaker(FrameProcessor):
         self._page.send(End(frame.utterance, frame.samples))
         await self._wait(lambda: self._playback.remaining(self._now()))
         self._speaking = None
-        self._page.show("idle")
+        self._page.show("thinking" if self._calls else "idle")
         await self.broadcast_frame(BotStoppedSpeakingFrame)
 
     async def _stop(self) -> None:

@@ -64,6 +64,8 @@ def test_a_settings_file_holds_tools_and_memory(tmp_path):
         ('type = "object"', 'type = "array"', "JSON schema"),
         ('name = "light"', "", "'name' is missing"),
         ("seconds = 2", "retries = 2", "no setting 'retries'"),
+        ("seconds = 2", 'headers = { A = "$" }', "write $NAME"),
+        ("seconds = 2", "headers = { A = 3 }", "'headers' must be"),
         ("[[tools]]", "[tools]", "."),
         ("tokens = 2000", "tokens = 3", "at least 200"),
     ],
@@ -81,7 +83,7 @@ class House:
     """A server with rooms, and what was asked of it."""
 
     def __init__(self):
-        self.seen, self.other = [], 0
+        self.seen, self.keys, self.other = [], [], 0
 
     def app(self):
         app = FastAPI()
@@ -99,6 +101,8 @@ class House:
             places = {
                 "home": "/echo/again",
                 "round": "/go/round",
+                "key": "/key",
+                "thief": f"http://127.0.0.1:{self.other}/key",
                 "localhost": f"http://localhost:{request.url.port}/echo/",
                 "port": f"http://127.0.0.1:{self.other}/echo/",
                 "file": "file:///etc/passwd",
@@ -114,6 +118,11 @@ class House:
         async def slow():
             await asyncio.sleep(5)
 
+        @app.api_route("/key", methods=["GET", "POST"])
+        async def key(request: Request):
+            self.keys.append(request.headers.get("X-Key"))
+            return {"no such key": request.headers.get("X-Key")}
+
         @app.get("/none")
         async def none():
             return Response("No such page.", 404)
@@ -128,12 +137,12 @@ async def house():
     async with running(rooms.app()) as port:
         allow = (f"127.0.0.1:{port}",)
 
-        async def call(place, arguments=None, method="GET", seconds=5.0, allow=allow):
+        async def call(place, arguments=None, method="GET", seconds=5.0, allow=allow, headers=None):
             names = {name: {} for name in (arguments or {})}
             required = [name for name in names if f"{{{name}}}" in place]
             schema = {"properties": names, "required": required}
             url = f"http://127.0.0.1:{port}{place}"
-            tool = Tool("t", "Test.", url, method, schema, seconds)
+            tool = Tool("t", "Test.", url, method, schema, seconds, headers or {})
             return await answer(tool, arguments or {}, allow)
 
         yield rooms, call
@@ -170,6 +179,20 @@ async def test_redirects_stay_on_their_host():
             assert "leads elsewhere" in (await call(f"/go/{where}"))["error"]
         assert "redirects too often" in (await call("/go/round"))["error"]
         assert "redirects what is sent" in (await call("/go/home", {"a": 1}, "POST"))["error"]
+
+
+async def test_a_key_goes_to_its_host_alone_and_not_to_the_model(monkeypatch):
+    monkeypatch.setenv("WEATHER_KEY", "a-key-of-the-weather")
+    headers, thief = {"X-Key": "$WEATHER_KEY"}, House()
+    async with house() as (rooms, call), running(thief.app()) as rooms.other:
+        for place, method in (("/key", "GET"), ("/key", "POST"), ("/go/key", "GET")):
+            told = await call(place, method=method, headers=headers)
+            assert told == {"status": 200, "body": {"no such key": "…"}}
+        assert "leads elsewhere" in (await call("/go/thief", headers=headers))["error"]
+        assert rooms.keys == ["a-key-of-the-weather"] * 3 and not thief.keys
+        monkeypatch.delenv("WEATHER_KEY")
+        told = await call("/key", headers=headers)
+        assert told["error"].endswith("needs WEATHER_KEY in the environment.")
 
 
 async def test_time_and_size_are_limited():

@@ -42,6 +42,8 @@ export interface ConversationView extends VoiceView, CaptionEvents {
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
   services(services: Services, offers: readonly Offer[]): void;
+  /** Whether the avatar remembers visitors; `tell` tells it what was said in earlier visits. */
+  memory(offered: boolean, tell: (texts: readonly string[]) => void): void;
   latency(milliseconds: number): void;
   metrics(name: string, values: Record<string, number>): void;
   /** The visitor waits in the server's queue. */
@@ -226,6 +228,9 @@ export class Conversation {
     this.voice.welcome(message);
     this.view.connected(message.resumed);
     this.view.services(message.services, message.offers);
+    this.view.memory(message.remembers, (texts) => {
+      if (!message.resumed) this.connection.send({ type: 'notes', texts: [...texts] });
+    });
     this.show('idle');
     for (const notice of message.notices) this.view.notice(told(notice));
   }

@@ -7,6 +7,7 @@ import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
 import { Overlay } from './overlay.ts';
+import { Memory } from './sheets/memory.ts';
 import { Panel } from './sheets/panel.ts';
 import { Settings } from './sheets/settings.ts';
 import { ServiceSheet } from './sheets/sheet.ts';
@@ -39,6 +40,7 @@ export function makePage(
   const controls = new Controls(root, words, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
+  const memory = new Memory(root, words, talker.home);
   const transcript = new Transcript(root, words, talker, signal);
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
@@ -54,7 +56,9 @@ export function makePage(
     },
     question(text, final) {
       captions.question(text, final);
-      if (final) transcript.record.asked(text);
+      if (!final) return;
+      transcript.record.asked(text);
+      memory.said(text);
     },
     answer: () => {}, // it is shown as it is heard
     heard(progress) {
@@ -70,6 +74,7 @@ export function makePage(
       showStandIns(root, words, services);
       sheet.show(services, offers);
     },
+    memory: (offered, tell) => memory.offer(offered, tell),
     notice: (sentence) => showNotice(root, words, sentence),
     sharesVoice: (shared) => (byId(root, 'shared-voice').hidden = !shared),
     microphone: (state) => controls.setMicrophone(state),

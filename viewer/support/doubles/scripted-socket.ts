@@ -47,7 +47,7 @@ export class ScriptedSocket {
     if (this.of('hello').length === 0) this.onopen!();
     const name = { name: 'scripted', stand_in: false };
     const services = { recognition: name, language: name, voice: name };
-    const welcome = { type: 'welcome', version: VERSION, session: 'first', resumed: false, services, notices: [], dictation: null, offers: [] };
+    const welcome = { type: 'welcome', version: VERSION, session: 'first', resumed: false, services, notices: [], dictation: null, offers: [], remembers: false };
     this.says({ ...welcome, ...more });
   }
 

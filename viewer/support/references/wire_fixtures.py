@@ -42,6 +42,7 @@ def server_messages() -> list:
             [Notice("still-lips", NOTICE)],
             Dictation("de-DE", None),
             [Offer("voice", "a", "A", "install it.")],
+            True,
         ),
         State("thinking"),
         Speech(3, 7, 4800, 5, pcm, expressions),

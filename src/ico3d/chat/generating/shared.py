@@ -9,6 +9,7 @@ from typing import Any
 
 from ico3d.bundle import evaluate, limits, manifest
 from ico3d.chat.observing.timing import PARTS
+from ico3d.chat.wire.protocol_visits import MAX_NOTE, MAX_NOTES
 from ico3d.common.expression import EYE_NAMES, LIDS
 from ico3d.motion import roles
 from ico3d.rig import shadow_map
@@ -41,6 +42,8 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             "wrap": shadow_map.WRAP,
         },
     ),
+    ("MAX_NOTES", "Sentences of earlier visits; chat/wire/protocol_visits.py.", MAX_NOTES),
+    ("MAX_NOTE", "Characters of each.", MAX_NOTE),
     ("LEAKY_SLOPE", "Of a head's coefficients; bundle/evaluate.py.", evaluate.LEAKY_SLOPE),
     ("LID_NAMES", "The eyelids among blendshapes.", [EYE_NAMES[lid] for lid in LIDS]),
     ("LIDS", "Their places in the eye and brow values; common/expression.py.", LIDS),

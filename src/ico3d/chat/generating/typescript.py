@@ -24,13 +24,9 @@ CONSTANTS = {
     "MICROPHONE_CHUNK": "samples of a message",
     "SPEECH_RATE": "Hz",
     "EXPRESSION_FPS": "rows per second",
-    "MAX_TEXT_FRAME": "bytes",
-    "MAX_BINARY_FRAME": "bytes",
-    "MAX_RATE": "messages per second",
-    "MAX_BURST": "messages",
     "RESUME_SECONDS": "",
-    "MAX_AHEAD_SECONDS": "",
 }
+"""What the page uses, with its unit."""
 
 NESTED = protocol.PARTS
 

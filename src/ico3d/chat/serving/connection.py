@@ -173,6 +173,7 @@ class Connection:
             self._notices,
             session.parts.dictation,
             self._sessions.offers,
+            session.conversation.remembers,
         )
         await self._socket.send_text(str(encode(welcome)))
         if not resumed:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 from ico3d.chat.settings.embedding import Embedding
 from ico3d.chat.settings.keys import check_key
+from ico3d.chat.settings.mcp import McpServer, check_servers
 from ico3d.chat.settings.tools import Tool, check_tools
 from ico3d.chat.settings.visits import Visits
 from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
@@ -72,13 +73,15 @@ class Turns:
 
 @dataclass(frozen=True)
 class Patience:
-    """How long services may take before the avatar apologises: the table `[patience]`.
+    """How long services may take before the avatar says something: the table `[patience]`.
 
     Attributes:
         language: Seconds until the first words of an answer, and between two pieces of it.
         reasoning: Seconds that a model may think before the first words, as long as it shows that
             it is thinking.
         voice: Seconds until the first sound of a sentence, and between two pieces of it.
+        tool: Seconds that a tool may take before the avatar asks for a moment, once in an
+            answer; 0 for never.
         apologies: Language in which the avatar apologises, such as `de`; empty for the persona's
             first language. English for languages without apologies.
     """
@@ -86,6 +89,7 @@ class Patience:
     language: float = 12.0
     reasoning: float = 60.0
     voice: float = 8.0
+    tool: float = 1.0
     apologies: str = ""
 
     def __post_init__(self):
@@ -96,6 +100,8 @@ class Patience:
         """
         if min(self.language, self.reasoning, self.voice) < 0.1:
             raise SettingsError("chat settings: [patience] needs at least 0.1 seconds for each.")
+        if self.tool < 0:
+            raise SettingsError("chat settings: [patience] tool must be 0 (never) or more.")
 
 
 @dataclass(frozen=True)
@@ -139,9 +145,12 @@ class Memory:
     Attributes:
         tokens: Approximate length of the conversation, without the system instruction, beyond which
             all but the latest messages are summarised.
+        visits: Whether pages may remember visitors who agree: what they said is kept in their own
+            browsers, and told to the language model at their next visit.
     """
 
     tokens: int = 4000
+    visits: bool = False
 
     def __post_init__(self):
         """Checks ranges.
@@ -173,6 +182,7 @@ class ChatSettings:
         limits: How much visitors may take.
         embedding: Who may put the avatar into their pages ([more](conversation/embedding.md)).
         tools: Functions over HTTP that the language model may call.
+        mcp: Servers of the Model Context Protocol, whose functions it may call, too.
         allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
             addresses must be listed as such.
     """
@@ -190,19 +200,21 @@ class ChatSettings:
     limits: Visits = Visits()
     embedding: Embedding = Embedding()
     tools: tuple[Tool, ...] = ()
+    mcp: tuple[McpServer, ...] = ()
     allow: tuple[str, ...] = ()
 
     def __post_init__(self):
         """Checks ranges.
 
         Raises:
-            SettingsError: If the limits of sessions make no sense, or a tool does not.
+            SettingsError: If the limits of sessions make no sense, or a tool or server does not.
         """
         if self.max_sessions < 1:
             raise SettingsError("chat settings: max_sessions must be at least 1.")
         if not 0 <= self.idle_minutes < math.inf:
             raise SettingsError("chat settings: idle_minutes must be 0 (never) or more.")
         check_tools(self.tools, self.allow)
+        check_servers(self.mcp, self.allow)
 
 
 def read_settings(path: Path | None) -> ChatSettings:

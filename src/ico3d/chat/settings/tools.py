@@ -7,6 +7,7 @@ from string import Formatter
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
+from ico3d.chat.settings.headers import check_headers
 from ico3d.errors import SettingsError
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
@@ -26,6 +27,8 @@ class Tool:
         method: `GET` (other parameters are added to the query) or `POST` (they form a JSON body).
         parameters: JSON schema of the parameters, of type `object`.
         seconds: Time limit of a call, s.
+        headers: Headers of each call, such as `{ Authorization = "Bearer $MUSEUM_KEY" }`; `$NAME`
+            stands for an environment variable. A key is never sent unencrypted to another machine.
     """
 
     name: str
@@ -34,6 +37,7 @@ class Tool:
     method: str = "GET"
     parameters: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 5.0
+    headers: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self):
         """Checks it.
@@ -41,7 +45,7 @@ class Tool:
         Raises:
             SettingsError: In one sentence, if something makes no sense.
         """
-        where = f"chat settings: tool {self.name[:80]!r}"
+        where = self.where
         named = NAME.fullmatch(self.name) and self.name not in OWN
         _require(named, where, f"needs another name: letters, digits, _ and -, and none of {OWN}")
         _require(self.description.strip(), where, "needs a description")
@@ -58,6 +62,12 @@ class Tool:
         )
         missing = [name for name in self.placeholders if name not in self.required]
         _require(not missing, where, "must require every parameter that its URL has in braces")
+        check_headers(self.url, self.headers, where)
+
+    @property
+    def where(self) -> str:
+        """The tool's place in the settings, for errors."""
+        return f"chat settings: tool {self.name[:80]!r}"
 
     @property
     def properties(self) -> dict[str, Any]:
@@ -83,7 +93,7 @@ def check_tools(tools: tuple[Tool, ...], allow: tuple[str, ...]) -> None:
     """
     names, hosts = [tool.name for tool in tools], {host.lower() for host in allow}
     for tool in tools:
-        where = f"chat settings: tool {tool.name!r}"
+        where = tool.where
         _require(names.count(tool.name) == 1, where, "is there twice")
         host = host_of(urlsplit(tool.url))
         _require(host in hosts, where, f"calls {host}, which is not in 'allow'")

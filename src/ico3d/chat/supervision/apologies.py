@@ -1,4 +1,4 @@
-"""Sentences that the avatar says when a service has failed."""
+"""Sentences that the avatar says when a service has failed, or a tool takes its time."""
 
 from typing import Literal
 
@@ -65,6 +65,21 @@ APOLOGIES: dict[str, dict[Failed, str]] = {
 }
 """Apologies by language (ISO 639-1) and failed service."""
 
+WAITING = {
+    "en": "One moment, please.",
+    "de": "Einen Moment, bitte.",
+    "fr": "Un instant, s'il vous plaît.",
+    "es": "Un momento, por favor.",
+    "it": "Un momento, per favore.",
+    "pt": "Um momento, por favor.",
+    "ru": "Одну минуту.",
+    "zh": "请稍等。",
+    "ja": "少々お待ちください。",
+    "ko": "잠시만요.",
+    "ar": "لحظة من فضلك.",
+}
+"""By language, what is said while a tool works: short, as the answer is asked for behind it."""
+
 
 def apology(failed: Failed, language: str) -> str:
     """The apology for a failed service; in English for languages without one.
@@ -74,6 +89,11 @@ def apology(failed: Failed, language: str) -> str:
         language: A code such as `de` or `pt-BR`.
     """
     return APOLOGIES.get(base(language), APOLOGIES["en"])[failed]
+
+
+def waiting(language: str) -> str:
+    """What is said while a tool works; in English for languages without such a sentence."""
+    return WAITING.get(base(language), WAITING["en"])
 
 
 def espeak_voice(language: str) -> str:

@@ -1,7 +1,7 @@
 """Calls of users' tools over HTTP, restricted to protect the server's network.
 
 Only listed hosts are called, at addresses that are public or listed themselves; redirects must stay
-on the same host; time and size are limited.
+on the same host, and so do headers; time and size are limited.
 """
 
 import contextlib
@@ -18,7 +18,9 @@ from aiohttp.resolver import DefaultResolver
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.services.llm_service import FunctionCallParams
 
+from ico3d.chat.settings.headers import blanked, filled_in
 from ico3d.chat.settings.tools import PORTS, Tool, host_of
+from ico3d.errors import SettingsError
 
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
 MOST_REDIRECTS = 3
@@ -94,8 +96,9 @@ async def answer(
         return {"error": f"{tool.name} did not answer within {tool.seconds:g} seconds."}
     except aiohttp.ClientConnectorError as error:
         return {"error": f"{tool.name} cannot be reached: {error.os_error}."}
-    except (Refused, aiohttp.ClientError, ValueError) as error:
-        return {"error": f"{tool.name} failed: {error or type(error).__name__}."}
+    except (Refused, SettingsError, aiohttp.ClientError, ValueError) as error:
+        said = str(error).rstrip(".") or type(error).__name__
+        return {"error": f"{tool.name} failed: {said}."}
 
 
 def _request(tool: Tool, arguments: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
@@ -104,12 +107,13 @@ def _request(tool: Tool, arguments: Mapping[str, Any]) -> tuple[str, dict[str, A
     missing = [name for name in tool.required if name not in arguments]
     if unknown or missing:
         raise Refused(f"it takes {list(tool.properties)} and needs {tool.required}")
+    headers = {"headers": filled_in(tool.headers, tool.where)}
     inside = {name: _quoted(arguments[name]) for name in tool.placeholders}
     url = tool.url.format_map(inside)
     rest = {name: value for name, value in arguments.items() if name not in inside}
     if tool.method == "POST":
-        return url, {"json": rest}
-    return url, {"params": {name: _text(value) for name, value in rest.items()}}
+        return url, {"json": rest, **headers}
+    return url, {"params": {name: _text(value) for name, value in rest.items()}, **headers}
 
 
 def _quoted(value: Any) -> str:
@@ -140,8 +144,8 @@ async def _fetch(
                 tool.method, url, allow_redirects=False, **options
             ) as response:
                 if response.status not in REDIRECTS:
-                    return {"status": response.status, "body": await _body(response)}
-                url, options = _next(tool, response), {}
+                    return {"status": response.status, "body": await _body(tool, response)}
+                url, options = _next(tool, response), {"headers": options["headers"]}
     raise Refused("it redirects too often")
 
 
@@ -160,13 +164,13 @@ def _next(tool: Tool, response: aiohttp.ClientResponse) -> str:
     return urljoin(str(response.url), response.headers.get("Location", ""))
 
 
-async def _body(response: aiohttp.ClientResponse) -> Any:
+async def _body(tool: Tool, response: aiohttp.ClientResponse) -> Any:
     data = b""
     async for part in response.content.iter_chunked(MOST_BYTES):
         data += part
         if len(data) > MOST_BYTES:
             raise Refused(f"its answer has more than {MOST_BYTES} bytes")
-    text = data.decode("utf-8", "replace")
+    text = blanked(data.decode("utf-8", "replace"), tool.headers, tool.where)
     try:
         return json.loads(text)
     except ValueError:

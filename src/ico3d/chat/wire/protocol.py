@@ -21,9 +21,9 @@ from ico3d.chat.wire.marks import (
 )
 from ico3d.chat.wire.protocol_gestures import MAX_CUES, Cue, Release
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
-from ico3d.chat.wire.protocol_visits import Error, Hello, Notice, Place, Welcome
+from ico3d.chat.wire.protocol_visits import Error, Hello, Notes, Notice, Place, Welcome
 
-VERSION = 7
+VERSION = 8
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
@@ -349,7 +349,7 @@ class Metrics:
     values: Annotated[dict[str, Milliseconds], Length(0, 32)]
 
 
-ClientMessage = Hello | Audio | Text | Say | Interrupt | Clock | Talk | Heard | Deaf
+ClientMessage = Hello | Notes | Audio | Text | Say | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
     | Place

@@ -6,6 +6,9 @@ from typing import Annotated
 from ico3d.chat.wire.marks import MAX_EXACT, Count, Length, Name, Range, Seconds, Words
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Services
 
+MAX_NOTES = 16  # sentences of earlier visits
+MAX_NOTE = 200  # characters of one; all of them together are less than a text frame
+
 
 @dataclass(frozen=True)
 class Hello:
@@ -50,6 +53,7 @@ class Welcome:
         notices: What this avatar cannot do.
         dictation: How the browser is to recognise speech; null if the server does.
         offers: Services to choose from; empty where strangers may be talking.
+        remembers: Whether the language model takes `notes` of earlier visits.
     """
 
     version: Count
@@ -59,6 +63,20 @@ class Welcome:
     notices: Annotated[list[Notice], Length(0, 8)]
     dictation: Dictation | None
     offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
+    remembers: bool = False
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What the visitor said in earlier visits, as the browser kept it; once in a new session.
+
+    Sent only by pages whose visitor agreed; servers refuse it unless `welcome` has `remembers`.
+
+    Attributes:
+        texts: The visitor's own sentences, the oldest first.
+    """
+
+    texts: Annotated[list[Annotated[str, Length(1, MAX_NOTE)]], Length(0, MAX_NOTES)]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Language models over HTTP: a scripted OpenAI-compatible server and the whole conversation."""
 
 import asyncio
-import contextlib
 import json
 import re
 
@@ -10,7 +9,6 @@ import pytest
 from fastapi import FastAPI
 from fastapi.responses import RedirectResponse, StreamingResponse
 
-from ico3d.bundle.persona import Persona
 from ico3d.chat.memory import PROMPT
 from ico3d.chat.performing.moods import BROWS, EASE
 from ico3d.chat.services import choose, chosen
@@ -24,42 +22,11 @@ from ico3d.chat.settings.tools import Tool
 from ico3d.chat.wire.protocol import Answer, End, Interrupt, Speech, State, Stop, Text, Timeline
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import SettingsError
-from ico3d.measure.talking.page import open_page
 from support.chat.pages import FollowingPlayer
 from support.chat.scripted_server import Call, Script, running
-from support.chat.serving import BROWSER, serving
+from support.chat.scripted_talk import ADA, ask, roles, talking
 
 pytestmark = pytest.mark.slow
-
-ADA = Persona("Ada")
-
-
-def settings_for(port, **others):
-    options = {"url": f"http://127.0.0.1:{port}/v1", "model": "tiny"}
-    return ChatSettings(BROWSER, Choice("openai", options), **others)
-
-
-@contextlib.asynccontextmanager
-async def talking(bundle, script, **others):
-    """Yields the page of a visitor whom nobody greets."""
-    async with contextlib.AsyncExitStack() as stack:
-        port = await stack.enter_async_context(running(script.app()))
-        served = serving(bundle, settings_for(port, **others), persona=ADA)
-        url, _ = await stack.enter_async_context(served)
-        page, _ = await open_page(url, microphone=False)
-        yield page
-        await page.close()
-
-
-async def ask(page, text, utterance):
-    """Asks, waits for all sound of the answer, returns its sentences."""
-    await page.send(Text(text))
-    await page.wait(End, where=lambda m: m.utterance == utterance)
-    return [m.text for m in page.messages(Answer) if m.utterance == utterance]
-
-
-def roles(body):
-    return [message["role"] for message in body["messages"]]
 
 
 async def test_a_conversation_keeps_its_thread_and_the_key_stays_at_home(bundle, monkeypatch):

@@ -16,6 +16,8 @@ export interface Talker {
   name: string;
   /** Language of the talk, BCP 47; empty if it is unknown. */
   lang: string;
+  /** Address of its server. */
+  home: string;
 }
 
 /** The drawer with all that was said, and what screen readers hear of it. */

@@ -1,0 +1,227 @@
+"""Functions of MCP servers, of which each visitor has connections of their own.
+
+So a server that remembers its client cannot mix visitors up. Whatever fails becomes one sentence
+for the model, and the next call connects anew.
+"""
+
+import asyncio
+import os
+import re
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from loguru import logger
+from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
+from pipecat.services.llm_service import FunctionCallParams
+
+from ico3d.chat.settings.headers import blanked, filled_in
+from ico3d.chat.settings.mcp import McpServer
+from ico3d.chat.tools.http import MOST_BYTES
+from ico3d.errors import Ico3dError
+
+if TYPE_CHECKING:
+    from mcp import Client
+    from mcp_types import CallToolResult, Tool
+
+LONGEST_NAME = 64  # that models accept for a function
+LONGEST_COMPLAINT = 200
+MOST_FUNCTIONS = 64  # of a server: all their descriptions are part of every question
+
+Offer = Callable[[list[FunctionSchema]], None]
+
+
+class Connections:
+    """A visitor's connections to all servers."""
+
+    def __init__(self, servers: tuple[McpServer, ...], offer: Offer):
+        """Starts unconnected.
+
+        Args:
+            servers: The servers.
+            offer: Called with the functions of a server once it is connected.
+        """
+        self._connections = [Connection(server) for server in servers]
+        self._offer = offer
+        self._tasks: list[asyncio.Task[None]] = []
+
+    def open(self) -> None:
+        """Connects in the background: a slow server keeps nobody waiting."""
+        self._tasks = [asyncio.create_task(self._ask(one)) for one in self._connections]
+
+    async def close(self) -> None:
+        """Ends all connections, and the programs behind them."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.gather(*(one.close() for one in self._connections))
+
+    async def _ask(self, connection: "Connection") -> None:
+        try:
+            functions = await connection.functions()
+        except Exception as error:
+            logger.warning(f"{connection.server.where} offers nothing: {connection.told(error)}.")
+        else:
+            self._offer(functions)
+
+
+@dataclass
+class _Line:
+    """An open line to a server: its client, and the task that holds both."""
+
+    closing: asyncio.Event = field(default_factory=asyncio.Event)
+    opened: "asyncio.Future[Client]" = field(
+        default_factory=lambda: asyncio.get_running_loop().create_future()
+    )
+    task: asyncio.Task[None] | None = None
+
+
+class Connection:
+    """A connection to one server, opened by the first use and again after it was lost."""
+
+    def __init__(self, server: McpServer):
+        """Starts unconnected."""
+        self.server = server
+        self._line: _Line | None = None
+
+    async def functions(self) -> list[FunctionSchema]:
+        """The functions that the server offers and the settings permit.
+
+        Raises:
+            Exception: Whatever the server or the way to it does not do.
+        """
+        async with asyncio.timeout(self.server.seconds):
+            listed = await (await self._client()).list_tools()
+        wanted = self.server.functions
+        chosen = [tool for tool in listed.tools if not wanted or tool.name in wanted]
+        return [self._function(tool) for tool in chosen[:MOST_FUNCTIONS]]
+
+    async def call(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """Calls a function: returns `result`, or `error` in one sentence for the model."""
+        try:
+            async with asyncio.timeout(self.server.seconds):
+                client = await self._client()
+                result = await client.call_tool(name, dict(arguments))
+        except Exception as error:
+            if is_lost(error):
+                await self.close()
+            return {"error": f"{name} failed: {self.told(error)}."}
+        text = blanked(text_of(result), self.server.secrets, self.server.where)
+        if len(text.encode()) > MOST_BYTES:
+            return {"error": f"{name} failed: its answer has more than {MOST_BYTES} bytes."}
+        if result.is_error:
+            said = " ".join(text.split()).rstrip(".")[:LONGEST_COMPLAINT]
+            return {"error": f"{name} failed: {said}."}
+        return {"result": text}
+
+    async def close(self) -> None:
+        """Ends the connection, and the program behind it."""
+        line, self._line = self._line, None
+        if line is not None and line.task is not None:
+            line.closing.set()
+            if not line.opened.done():
+                line.task.cancel()
+            await asyncio.gather(line.task, return_exceptions=True)
+
+    def told(self, error: BaseException) -> str:
+        """What went wrong, in part of a sentence without keys."""
+        if isinstance(error, TimeoutError):
+            return f"it did not answer within {self.server.seconds:g} seconds"
+        while isinstance(error, BaseExceptionGroup):  # of the tasks of a connection
+            error = error.exceptions[0]
+        said = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+        return blanked(said, self.server.secrets, self.server.where)[:LONGEST_COMPLAINT]
+
+    def _function(self, tool: "Tool") -> FunctionSchema:
+        async def call(params: FunctionCallParams) -> None:
+            await params.result_callback(await self.call(tool.name, params.arguments))
+
+        name = re.sub(r"[^A-Za-z0-9_-]", "_", f"{self.server.name}_{tool.name}")[:LONGEST_NAME]
+        schema = tool.input_schema
+        about = blanked(tool.description or tool.name, self.server.secrets, self.server.where)
+        properties, required = schema.get("properties", {}), schema.get("required", [])
+        return FunctionSchema(name, about, properties, required, call)
+
+    async def _client(self) -> "Client":
+        """The client of an open line; opens one if there is none."""
+        if self._line is None or (self._line.task and self._line.task.done()):
+            self._line = line = _Line()
+            line.task = asyncio.create_task(self._hold(line))
+        return await asyncio.shield(self._line.opened)
+
+    async def _hold(self, line: _Line) -> None:
+        """Holds a line from its beginning to its end, which have to be in one task."""
+        try:
+            opened = over_http if self.server.url else as_program
+            async with opened(self.server) as client:
+                line.opened.set_result(client)
+                await line.closing.wait()
+        except Exception as error:
+            if not line.opened.done():
+                line.opened.set_exception(error)
+        finally:
+            line.opened.cancel()
+            with suppress(asyncio.CancelledError, Exception):
+                line.opened.exception()  # taken, else asyncio complains of it
+
+
+@asynccontextmanager
+async def over_http(server: McpServer) -> AsyncIterator["Client"]:
+    """A client of a server at an address.
+
+    Redirects stay there, as the SDK has it, and nothing goes through a proxy.
+
+    Raises:
+        SettingsError: If an environment variable is not set.
+        Exception: If the server cannot be reached.
+    """
+    import httpx2
+    from mcp import Client
+    from mcp.client.streamable_http import streamable_http_client
+
+    headers = filled_in(server.headers, server.where)
+    limits = httpx2.Timeout(server.seconds, read=None)  # a stream is silent between calls
+    async with (
+        httpx2.AsyncClient(headers=headers, timeout=limits, trust_env=False) as http,
+        Client(streamable_http_client(server.url, http_client=http)) as client,
+    ):
+        yield client
+
+
+@asynccontextmanager
+async def as_program(server: McpServer) -> AsyncIterator["Client"]:
+    """A client of a server that is a program, which runs as long.
+
+    Raises:
+        SettingsError: If an environment variable is not set.
+        Exception: If the program does not start.
+    """
+    from mcp import Client, StdioServerParameters
+    from mcp.client.stdio import stdio_client
+
+    environment = filled_in(server.environment, server.where)
+    command, *arguments = server.command
+    parameters = StdioServerParameters(command=command, args=arguments, env=environment)
+    with Path(os.devnull).open("w") as nowhere:  # what it says there may quote visitors and keys
+        async with Client(stdio_client(parameters, errlog=nowhere)) as client:
+            yield client
+
+
+def text_of(result: "CallToolResult") -> str:
+    """The words of an answer; what else it has, such as pictures, is named."""
+    parts = [
+        part.text if part.type == "text" else f"({part.type} left out)" for part in result.content
+    ]
+    return "\n".join(parts)
+
+
+def is_lost(error: Exception) -> bool:
+    """Whether an error ended the connection, rather than the one call."""
+    from mcp import MCPError
+    from mcp_types import CONNECTION_CLOSED, INVALID_REQUEST
+
+    if isinstance(error, TimeoutError | Ico3dError):
+        return False
+    return not isinstance(error, MCPError) or error.code in (CONNECTION_CLOSED, INVALID_REQUEST)
