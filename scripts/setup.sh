@@ -88,7 +88,7 @@ if command -v dpkg >/dev/null; then
   apt_packages libgomp1 libegl1 libgles2 libgl1 libglib2.0-0
   command -v chromium >/dev/null || command -v google-chrome >/dev/null || apt_packages chromium
 fi
-extras=train,watch,face,body,cluster,synthetic,chat,voice,qwen,dev
+extras=train,watch,face,body,cluster,synthetic,chat,voice,qwen,mcp,dev
 if command -v nvidia-smi >/dev/null && nvidia-smi -L >/dev/null 2>&1; then
   extras=$extras,cuda
   command -v nvcc >/dev/null || echo "note: no nvcc, with which gsplat compiles its kernels at first use: until the CUDA toolkit is installed, ico3d computes on the CPU" >&2
