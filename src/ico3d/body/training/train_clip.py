@@ -256,6 +256,7 @@ def train_body(
     if run.finished() is not None:
         return TrainedBody.load(folder)
     tasks, flow = window_tasks(capture, folder, job)
+    run.expect(sum(task.steps for task in tasks) + job.settings.finetune.steps * (len(tasks) - 1))
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     made = _made(job, tasks, flow)
     body = _save(capture, folder, job, tasks, seconds, made)
