@@ -138,7 +138,7 @@ def load_sealed(path: Path) -> tuple[dict[str, Tensor], dict]:
 
 def check_seal(path: Path) -> None:
     """Raises ModelError if the file is missing, no safetensors file, or has changed."""
-    with _opened(path), path.open("rb") as file:
+    with _opened(path, ""), path.open("rb") as file:
         head = file.read(8 + len(_SEALED))
         seal = file.read(len(_NO_SEAL))
         sealed = head[8:] == _SEALED
@@ -174,13 +174,11 @@ def load_state(path: Path) -> dict:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[safe_open]:
+def _opened(path: Path, advice: str = ": train again") -> Iterator[safe_open]:
     try:
         if not path.is_file():
             raise ModelError(f"there is no model file at {path}.")
         with safe_open(path, framework="pt") as file:
             yield file
     except (SafetensorError, *DAMAGED) as error:
-        raise ModelError(
-            f"{path} is damaged or no file of ico3d ({error}): train again."
-        ) from error
+        raise ModelError(f"{path} is damaged or no file of ico3d ({error}){advice}.") from error
