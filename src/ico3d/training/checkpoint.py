@@ -127,7 +127,7 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
 
 
 def load_sealed(path: Path) -> tuple[dict[str, Tensor], dict]:
-    """Reads what `save_sealed` wrote; of files of earlier versions, which have no hash, all is taken.
+    """Reads what `save_sealed` wrote, or an earlier version without a hash.
 
     Raises:
         ModelError: As for `load_tensors`, and if anything in the file has changed.

@@ -145,7 +145,7 @@ def _check_loss(values: Mapping[str, float | Tensor], trainee: Trainee) -> None:
 
 
 def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:
-    """Restores the latest checkpoint that can be used; the step to go on with and the seconds spent before."""
+    """Restores the latest usable checkpoint; its step, and the seconds spent until then."""
     checkpoint = run.checkpoint(trainee.tensors().keys())
     if checkpoint is None:
         return 0, 0.0

@@ -132,11 +132,8 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     capture = training_part(capture or open_capture(task.capture), job.hold_out)
     trainer, begin = window_trainer(task, capture)
     note_environment(task.folder, trainer.model.device)
-    loop = LoopSettings(
-        task.steps,
-        checkpoint_every=job.settings.checkpoint_every,
-        label=task.label,
-    )
+    every = job.settings.checkpoint_every
+    loop = LoopSettings(task.steps, checkpoint_every=every, label=task.label)
     seconds = run_loop(trainer, run, loop)
     save_window(task.file, trainer.model)
     summary = {"train_seconds": seconds, "num_gaussians": len(trainer.model)}

@@ -15,7 +15,7 @@ SIZES = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 @dataclass(frozen=True)
 class Runs:
-    """Lists trainings: how far they are, what became of them, and the command by which each goes on.
+    """Lists trainings: how far they are, what became of them, by which command each goes on.
 
     Attributes:
         folder: The folder to look through, with all folders below it.

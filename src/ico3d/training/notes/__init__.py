@@ -1,1 +1,1 @@
-"""What a run folder tells while and after somebody trains in it: its command, its steps, its end."""
+"""What a run tells of itself: who works at it, its command, its steps, its end."""

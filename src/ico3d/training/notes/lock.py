@@ -1,4 +1,4 @@
-"""Keeps a run folder to one process at a time; the lock ends with the process, however that ends."""
+"""Keeps a run to one process at a time; the lock ends with the process, however that ends."""
 
 import fcntl
 import os

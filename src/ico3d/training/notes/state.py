@@ -79,7 +79,7 @@ def ended(folder: Path) -> None:
         command.runs[:] = [run for run in command.runs if run != folder]
 
 
-def note(folder: Path, **changes: Any) -> None:
+def note(folder: Path, /, **changes: Any) -> None:
     """Changes the notes of a run, where they differ.
 
     Args:
