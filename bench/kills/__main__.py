@@ -4,8 +4,9 @@
 
 Records a small synthetic person and trains a head, trains a body and assembles both by the command
 line: twice at a stretch, of which the first compiles kernels, and then again and again with
-SIGKILL. The moments are drawn evenly from the time between the first file of a run at a stretch and
-its end; at every fourth the kill waits until a file is being written. After each kill `ico3d runs`
+SIGKILL. The moments are drawn evenly from the processor time between the first file of a run at a
+stretch and its end, so that it does not matter what else the machine does; every fourth is drawn
+from the first half, and the kill then waits until a file is being written. After each kill `ico3d runs`
 must call the run interrupted, and the command that it shows goes on. A run that is killed often
 enough or comes through is compared with the one at a stretch: all files but logs of TensorBoard and
 notes of commands, without the seconds that training took. The status is 1 unless all are alike.
@@ -14,6 +15,7 @@ notes of commands, without the seconds that training took. The status is 1 unles
 import json
 import os
 import random
+import re
 import subprocess
 import sys
 import time
@@ -40,8 +42,10 @@ BODY = (
     *("--density.every", "10", "--windows.longest", "6", "--windows.shortest", "3"),
     *("--finetune.steps", "24", *SMALL),
 )
-UNFINISHED = ".*.????????????????*"
+UNFINISHED = re.compile(r"\..+\.[0-9a-f]{16}(\..*)?")
 """Names of files that are being written."""
+TICKS = os.sysconf("SC_CLK_TCK")
+"""Of the clock of processor time, in a second."""
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
 
 
@@ -167,14 +171,16 @@ def killed_often(task: Task, out: Path, kills: int, rng: random.Random) -> Tally
 
 
 def at_a_stretch(task: Task, out: Path, folder: str) -> tuple[float, float]:
-    """Trains without a kill; seconds from the start to the first file, and to the end."""
-    words, begin = task.words(folder), time.monotonic()
-    process = _start(words, out)
-    while process.poll() is None and not (out / folder / SETTINGS).exists():
+    """Trains without a kill; processor seconds until the first file, and until the end."""
+    words = task.words(folder)
+    process, first, used = _start(words, out), 0.0, 0.0
+    while process.poll() is None:
+        used = _processor_seconds(process) or used
+        if not first and (out / folder / SETTINGS).exists():
+            first = used
         time.sleep(0.005)
-    first = time.monotonic() - begin
     _end(process, words)
-    return first, time.monotonic() - begin
+    return first, used
 
 
 def _is_killed(
@@ -192,15 +198,17 @@ def _is_killed(
     """
     words = read_state(folder).command or task.words(folder.name)
     process = _start(words, folder.parent)
-    moment = time.monotonic() + rng.uniform(*span)
     if tally.kills == kills:
         _end(process, words)
         return False
-    while process.poll() is None and time.monotonic() < moment:
+    waits = tally.kills % 4 == 3
+    share, late = rng.random() / (2 if waits else 1), rng.random()
+    moment = span[0] + share * (span[1] - span[0])
+    while process.poll() is None and _processor_seconds(process) < moment:
         time.sleep(0.001)
-    if tally.kills % 4 == 3:
-        while process.poll() is None and not _is_writing(folder):
-            time.sleep(0.0005)
+    time.sleep(late / TICKS)
+    while waits and process.poll() is None and not _is_writing(folder):
+        pass
     process.kill()
     if process.wait() != -9:
         _end(process, words)
@@ -230,8 +238,24 @@ def _step_of(folder: Path, words: tuple[str, ...]) -> int:
     return run.step
 
 
+def _processor_seconds(process: subprocess.Popen) -> float:
+    """Processor time that a process has used, in whole ticks; 0 once it has ended."""
+    try:
+        told = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(told[11]) + int(told[12])) / TICKS
+
+
 def _is_writing(folder: Path) -> bool:
-    return any(folder.rglob(UNFINISHED)) if folder.exists() else False
+    """Whether a file is being written, or was when its writer was killed."""
+    try:
+        entries = list(os.scandir(folder))
+    except OSError:  # not yet there
+        return False
+    return any(UNFINISHED.fullmatch(entry.name) for entry in entries) or any(
+        _is_writing(Path(entry.path)) for entry in entries if entry.is_dir()
+    )
 
 
 def _start(words: tuple[str, ...], out: Path) -> subprocess.Popen:

@@ -11,6 +11,7 @@ from ico3d.body.training.picture_step import Learner
 from ico3d.body.training.train_clip import train_window
 from ico3d.body.workers.jobs import Lost, train_windows
 from ico3d.errors import ModelError, StorageError
+from ico3d.training.listing.find_runs import find_runs
 from support.avatars.planted_person import planted_head
 from support.avatars.tiny_joining import assembly_of
 from support.full_disk import files_of_at_most
@@ -93,6 +94,8 @@ def test_an_assembly_goes_on_after_a_full_disk_nan_and_a_lost_worker(
             go_on()
         with files_of_at_most(100_000), pytest.raises(StorageError, match=r"checkpoint.* is full"):
             go_on()
+    (run,) = find_runs(tmp_path / "parts")
+    assert (run.kind, run.step, run.steps, run.state) == ("assemble", 8, 18, "interrupted")
     with monkeypatch.context() as patch:
         at_step(patch, 13, dies)
         crew = Dying(person, patch)

@@ -8,6 +8,7 @@ import torch
 from ico3d.body.training.picture_step import Learner
 from ico3d.body.training.train_clip import train_body
 from ico3d.errors import ModelError, StorageError
+from ico3d.training.listing.find_runs import find_runs
 from ico3d.training.run import CHECKPOINT
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import job
@@ -54,6 +55,8 @@ def test_a_body_goes_on_after_a_full_disk_nan_and_a_damaged_checkpoint(
         poisoned(patch, 11, 1)
         train_body(capture, parts, JOB)
     (parts / "windows/0001" / CHECKPOINT).write_bytes(b"")
+    (run,) = find_runs(parts)
+    assert (run.kind, run.step, run.steps, run.state) == ("body", 24, 46, "interrupted")
     said = r"is not finite at step 4: .*goes on from step 4\)"
     with monkeypatch.context() as patch, pytest.raises(ModelError, match=said):
         poisoned(patch, 4, 1)  # of fine-tuning, which comes after the second window
@@ -61,3 +64,5 @@ def test_a_body_goes_on_after_a_full_disk_nan_and_a_damaged_checkpoint(
     assert "Training goes on from the checkpoint before, at step 4." in caplog.text
     train_body(capture, parts, JOB)
     assert files(parts) == whole
+    (run,) = find_runs(parts)
+    assert (run.step, run.steps, run.state) == (46, 46, "finished")

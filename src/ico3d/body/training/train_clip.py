@@ -29,6 +29,7 @@ from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.notes.lock import lets_go
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
@@ -109,6 +110,7 @@ Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
 """Trains windows; returns the seconds spent in optimisation steps for each of them."""
 
 
+@lets_go
 def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     """Trains a window and writes its file, or continues an interrupted run of the same settings.
 
@@ -172,6 +174,7 @@ def _begin(
     return begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
 
 
+@lets_go
 def finetune_window(
     task: WindowTask, capture: Capture, trained: Path, previous: WindowModel
 ) -> float:
@@ -211,17 +214,15 @@ def finetune_window(
     tuner = FineTuner(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed, companion
     )
-    loop = LoopSettings(
-        job.settings.finetune.steps,
-        checkpoint_every=job.settings.checkpoint_every,
-        label=f"fine-tuning window {task.index}",
-    )
+    steps, every = job.settings.finetune.steps, job.settings.checkpoint_every
+    loop = LoopSettings(steps, checkpoint_every=every, label=f"fine-tuning window {task.index}")
     seconds = run_loop(tuner, run, loop)
     save_window(task.file, tuner.model)
     run.finish({"train_seconds": seconds, "num_gaussians": len(tuner.model)})
     return seconds
 
 
+@lets_go
 def train_body(
     capture: Capture, folder: Path, job: BodyJob, runner: Runner | None = None
 ) -> TrainedBody:

@@ -3,7 +3,11 @@
 import fcntl
 import os
 import time
+from collections.abc import Callable
+from contextvars import ContextVar
+from functools import wraps
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 from weakref import WeakValueDictionary
 
 from ico3d.errors import SettingsError
@@ -11,10 +15,12 @@ from ico3d.errors import SettingsError
 PATIENCE = 5.0
 """Seconds within which a process that was killed, or a look at the lock, lets it go."""
 _PAUSE = 0.05
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class Lock:
-    """A file that this process alone has locked, as long as the object lives."""
+    """A file that this process alone has locked, until it lets go or the object is collected."""
 
     def __init__(self, file: Path):
         """Locks a file that exists.
@@ -41,13 +47,24 @@ class Lock:
                 return
             time.sleep(_PAUSE)
 
+    @property
+    def is_held(self) -> bool:
+        """Whether it was not let go."""
+        return not self._file.closed
+
+    def let_go(self) -> None:
+        """Others may work there."""
+        self._file.close()
+
     def __del__(self):
-        """Lets go."""
+        """Nobody knows it any more."""
         self._file.close()
 
 
 _HELD: WeakValueDictionary[tuple[int, int], Lock] = WeakValueDictionary()
 """What this process has locked, by device and inode."""
+_TAKEN: ContextVar[list[Lock] | None] = ContextVar("taken", default=None)
+"""The locks that were taken since `lets_go` began to watch."""
 
 
 def locked(file: Path) -> Lock:
@@ -59,9 +76,32 @@ def locked(file: Path) -> Lock:
     about = os.stat(file)
     key = about.st_dev, about.st_ino
     held = _HELD.get(key)
-    if held is None:
+    if held is None or not held.is_held:
         held = _HELD[key] = Lock(file)
+        taken = _TAKEN.get()
+        if taken is not None:
+            taken.append(held)
     return held
+
+
+def lets_go(train: Callable[P, T]) -> Callable[P, T]:
+    """Makes a function let all locks go in the end that it took.
+
+    Without, an error that somebody keeps would keep the frames that hold the locks.
+    """
+
+    @wraps(train)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> T:
+        taken: list[Lock] = []
+        token = _TAKEN.set(taken)
+        try:
+            return train(*args, **kwargs)
+        finally:
+            _TAKEN.reset(token)
+            for lock in taken:
+                lock.let_go()
+
+    return wrapped
 
 
 def is_locked(file: Path) -> bool:
