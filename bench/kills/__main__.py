@@ -6,10 +6,11 @@ Records a small synthetic person and trains a head, trains a body and assembles 
 line: twice at a stretch, of which the first compiles kernels, and then again and again with
 SIGKILL. The moments are drawn evenly from the processor time between the first file of a run at a
 stretch and its end, so that it does not matter what else the machine does; every fourth is drawn
-from the first half, and the kill then waits until a file is being written. After each kill `ico3d runs`
-must call the run interrupted, and the command that it shows goes on. A run that is killed often
-enough or comes through is compared with the one at a stretch: all files but logs of TensorBoard and
-notes of commands, without the seconds that training took. The status is 1 unless all are alike.
+from the first half, and the kill then waits until a file is being written. After each kill `ico3d
+runs` must call the run interrupted, and the command that it shows goes on. A run that was killed
+often enough, or comes through, is compared with the one at a stretch: all files but logs of
+TensorBoard and notes of commands, without the seconds that training took. The status is 1 unless
+all are alike.
 """
 
 import json
