@@ -69,6 +69,14 @@ def test_a_command_is_that_of_another_folder(project, monkeypatch):
     assert command == f"cd {place} && ico3d train head captures/me 'my runs/me'"
 
 
+def test_a_run_that_was_moved_goes_on_where_it_is(project):
+    words = ("ico3d", "train", "head", "captures/me", "runs/stopped", "--steps", "20")
+    with pytest.raises(KeyboardInterrupt):
+        train(project / "stopped", HEAD, Walk(die_at=14), words)
+    moved = (project / "stopped").rename(project.parent / "my head")
+    assert found(moved)["my head"][-1] == (f"ico3d train head captures/me '{moved}' --steps 20")
+
+
 def test_a_run_that_goes_on_has_not_failed(project):
     with pytest.raises(KeyboardInterrupt):
         train(project / "nan", HEAD, Walk(die_at=9), ("ico3d", "train", "head", "a", "b"))

@@ -9,7 +9,7 @@ import tyro
 if TYPE_CHECKING:
     from ico3d.training.listing.find_runs import Run
 
-AGES = ((86_400, "days"), (3_600, "h"), (60, "min"))
+AGES = ((86_400, "d"), (3_600, "h"), (60, "min"))
 SIZES = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 

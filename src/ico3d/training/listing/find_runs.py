@@ -25,6 +25,7 @@ KINDS = {
     "video": "create",
 }
 """What is made, by the first of these entries that a marking file has."""
+LOST = "No other checkpoint can be used: put a copy there, or move it away to begin afresh."
 State = Literal["finished", "running", "interrupted", "failed", "damaged"]
 
 
@@ -149,7 +150,7 @@ def _told(node: _Node) -> Run:
         node.steps(),
         state,
         reason,
-        _command(node.state) if left else "",
+        _command(node) if left else "",
         changed,
         size,
     )
@@ -166,7 +167,7 @@ def _judged(node: _Node) -> tuple[State, str]:
     unfinished = [one for one in node.all() if not one.is_finished]
     for one in unfinished:
         if one.is_lost:
-            return "damaged", one.saved[1][0]
+            return "damaged", f"{one.saved[1][0]} {LOST}"
     for one in unfinished:
         if one.state.failed is not None:
             return "failed", one.state.failed
@@ -174,12 +175,18 @@ def _judged(node: _Node) -> tuple[State, str]:
     return "interrupted", f"{older[0]} It goes on from the one before." if older else ""
 
 
-def _command(state: RunState) -> str:
-    """The command by which a run goes on."""
+def _command(node: _Node) -> str:
+    """The command by which a run goes on, where it now is."""
+    state, now = node.state, str(node.path.resolve())
     if not state.command:
         return ""
-    words = shlex.join(state.command)
-    return words if state.folder == os.getcwd() else f"cd {shlex.quote(state.folder)} && {words}"
+    words = list(state.command)
+    if now != state.path:
+        at = (os.path.abspath(os.path.join(state.folder, word)) for word in state.command)
+        words = [now if path == state.path else word for path, word in zip(at, words, strict=True)]
+    command = shlex.join(words)
+    here = state.folder == os.getcwd()
+    return command if here else f"cd {shlex.quote(state.folder)} && {command}"
 
 
 def _extent(folder: Path) -> tuple[int, float]:

@@ -22,6 +22,7 @@ class RunState:
     Attributes:
         command: Words of the command that began it, or went on with it last; none if a program did.
         folder: Folder in which that command was given.
+        path: The run's own folder at that time; people move and copy runs.
         steps: Number of its optimisation steps; None while that is not known.
         failed: The sentence with which it ended; None if it did not fail.
         done: Whether all is made; trainings have `finished.json` for that.
@@ -29,6 +30,7 @@ class RunState:
 
     command: tuple[str, ...] = ()
     folder: str = ""
+    path: str = ""
     steps: int | None = None
     failed: str | None = None
     done: bool = False
@@ -68,7 +70,7 @@ def begun(folder: Path) -> None:
     told: dict[str, Any] = {"failed": None, "done": False}
     if command is not None:
         command.runs.append(folder)
-        told |= {"command": command.words, "folder": os.getcwd()}
+        told |= {"command": command.words, "folder": os.getcwd(), "path": str(folder.resolve())}
     note(folder, **told)
 
 
@@ -102,6 +104,7 @@ def read_state(folder: Path) -> RunState:
         return RunState(
             tuple(map(str, told["command"])),
             str(told["folder"]),
+            str(told["path"]),
             None if told["steps"] is None else int(told["steps"]),
             None if told["failed"] is None else str(told["failed"]),
             bool(told["done"]),
