@@ -205,11 +205,11 @@ def _extent(folder: Path) -> tuple[int, float]:
 
 def _nodes(folder: Path) -> list[_Node]:
     """The outermost runs in a folder, itself among them, each with those within it."""
-    inside = sorted(
-        Path(entry.path)
-        for entry in os.scandir(folder)
-        if entry.is_dir(follow_symlinks=False) and not entry.name.startswith(".")
-    )
+    try:
+        entries = [one for one in os.scandir(folder) if one.is_dir(follow_symlinks=False)]
+    except OSError:  # not ours to read
+        return []
+    inside = sorted(Path(one.path) for one in entries if not one.name.startswith("."))
     below = [node for path in inside for node in _nodes(path)]
     own = _node(folder)
     if own is None:
