@@ -68,6 +68,7 @@ bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 	$(PY) bench/gpu.py --out $(RESULTS)/gpu
 	$(PY) bench/files.py src/ico3d/chat/data/demo.ico3d --json $(RESULTS)/files.json
 	$(if $(filter %.npz,$(SUBJECT)),$(PY) bench/stress.py $(SUBJECT) --json $(RESULTS)/stress.json)
+	$(if $(filter %.npz,$(SUBJECT)),$(PY) bench/kills $(SUBJECT) $(RESULTS)/kills)
 	ico3d bench chat --json $(RESULTS)/chat.json
 	cd viewer && npm run --silent bench
 

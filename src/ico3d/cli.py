@@ -10,6 +10,7 @@ import tyro
 
 from ico3d import __version__
 from ico3d.errors import Ico3dError
+from ico3d.training.notes.state import carried_out
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ VERBS: dict[str, Verb] = {
     "train static": Verb("ico3d.scene.commands", "TrainStatic", "train a scene that stands still"),
     "train body": Verb("ico3d.body.commands", "TrainBody", "train SWinGS++ on a body in motion"),
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
+    "runs": Verb("ico3d.training.listing.command", "Runs", "list trainings, and how they go on"),
     "assemble": Verb("ico3d.avatar.joining.command", "Assemble", "put a head on a person's body"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "animate": Verb("ico3d.avatar.animation.command", "Animate", "find a body's rest and gestures"),
@@ -139,7 +141,13 @@ def main(arguments: list[str] | None = None) -> int:
     verb = verb_of(words)
     if verb is None:
         return _list_verbs(words)
-    return ended(lambda: parsed(verb, words[len(verb.split()) :]).run())
+
+    def run() -> int | None:
+        settings = parsed(verb, words[len(verb.split()) :])
+        with carried_out(("ico3d", *words)):
+            return settings.run()
+
+    return ended(run)
 
 
 def run_script(settings: type) -> int:

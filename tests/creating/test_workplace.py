@@ -2,7 +2,9 @@ import pytest
 
 from ico3d.creating.settings import CreateSettings
 from ico3d.creating.workplace import workplace
-from ico3d.errors import SettingsError, StorageError
+from ico3d.errors import CaptureError, SettingsError, StorageError
+from ico3d.training.listing.find_runs import find_runs
+from ico3d.training.notes.state import carried_out
 
 
 @pytest.fixture
@@ -79,3 +81,21 @@ def test_an_avatar_made_by_others_is_not_written_over(settings):
 def test_a_place_that_cannot_be_written(settings):
     inside = _other(settings, out=settings.video / "me.ico3d")
     _refused(inside, StorageError, "cannot be written")
+
+
+def test_what_is_created_is_listed_with_its_command(settings, tmp_path):
+    def state():
+        (run,) = find_runs(tmp_path)
+        return run.kind, run.state, run.reason, run.command.rpartition(" && ")[2]
+
+    command = "ico3d create me.mp4 me.ico3d"
+    with pytest.raises(CaptureError), carried_out(tuple(command.split())), workplace(settings):
+        assert state() == ("create", "running", "", "")
+        raise CaptureError("nobody is in the picture.")
+    assert state() == ("create", "failed", "nobody is in the picture.", command)
+    with pytest.raises(KeyboardInterrupt), workplace(settings):
+        raise KeyboardInterrupt
+    assert state() == ("create", "interrupted", "", command)
+    with workplace(settings):
+        pass
+    assert state() == ("create", "finished", "", "")

@@ -1,4 +1,4 @@
-"""Training is killed, and killed again, and still gives the same head."""
+"""Training is killed, meets a full disk and a damaged checkpoint, and gives the same head."""
 
 import json
 import random
@@ -9,8 +9,13 @@ from pathlib import Path
 import pytest
 from safetensors.torch import load_file
 
+from ico3d.errors import StorageError
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.training.processes import fork_server
+from ico3d.training.run import BEFORE, CHECKPOINT
+from support.full_disk import files_of_at_most
 from support.heads.train_tiny import PAPER, SETTINGS, train_as_paper, train_tiny
+from support.settings import changed
 from support.weights.lpips import write_vgg
 
 pytestmark = pytest.mark.slow
@@ -100,6 +105,29 @@ def test_the_papers_settings_are_killed_and_give_the_same_head_bit_for_bit(
         "mixed_precision": False,
         "encoder": None,
     }
+
+
+def test_a_head_goes_on_after_a_full_disk_and_after_a_damaged_checkpoint(tiny, tmp_path, caplog):
+    few = {"steps": 16, "checkpoint_every": 4, "initial.gaussians": 100}
+    job = HeadJob("blendshapes", "full", "builtin", 0, changed(SETTINGS, few))
+    train_head(tiny, tmp_path / "whole", job)
+    whole = (tmp_path / "whole" / "model.safetensors").read_bytes()
+    parts = tmp_path / "parts"
+    with (
+        files_of_at_most(len(whole) // 2),
+        pytest.raises(StorageError, match=r"checkpoint\.safetensors cannot be written"),
+    ):
+        train_head(tiny, parts, job)
+    assert not (parts / CHECKPOINT).exists() and not list(parts.glob(".*"))
+    (parts / "model.safetensors").mkdir()  # so that writing the model fails, after all steps
+    with pytest.raises(OSError, match="directory"):
+        train_head(tiny, parts, job)
+    (parts / "model.safetensors").rmdir()
+    assert (parts / BEFORE).is_file()
+    (parts / CHECKPOINT).write_bytes((parts / CHECKPOINT).read_bytes()[:-1])
+    train_head(tiny, parts, job)
+    assert "Training goes on from the checkpoint before, at step 8." in caplog.text
+    assert (parts / "model.safetensors").read_bytes() == whole
 
 
 def _assert_tidy(folder: Path) -> None:

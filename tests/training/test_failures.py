@@ -11,7 +11,7 @@ from ico3d.errors import DeviceError, StorageError
 from ico3d.training.checkpoint import DTYPES, load_tensors, save_tensors, size_of_tensors
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
-from training.full_disk import files_of_at_most
+from support.full_disk import files_of_at_most
 from training.walk import Walk
 
 SETTINGS = LoopSettings(steps=20, log_every=5, checkpoint_every=4)

@@ -18,12 +18,16 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a system says when a disk, a quota or the limit of a file's size is reached."""
 
 
-def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> None:
+def write_atomic(
+    path: Path | str, write: Callable[[Path], None] | bytes, before: Path | None = None
+) -> None:
     """Writes a file under a temporary name, flushes it to disk and renames it.
 
     Args:
         path: The file to write; its folder is made where missing.
         write: The contents, or a function that writes them to the temporary path it is given.
+        before: Name that a file which was there before gets, once the new one is on the disk; None
+            replaces it.
 
     Raises:
         StorageError: If the disk is full; a file that was there before is kept.
@@ -40,6 +44,8 @@ def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> Non
                 write(temporary)
             with temporary.open("rb") as file:
                 os.fsync(file.fileno())
+            if before is not None and path.exists():
+                os.replace(path, before)
             os.replace(temporary, path)
             _sync_folder(path.parent)
     finally:

@@ -12,6 +12,7 @@ from pathlib import Path
 from ico3d.common.files import write_atomic
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import SettingsError, StorageError
+from ico3d.training.notes.state import begun, ended, note
 
 ABOUT, DONE = "about.json", "done.json"
 
@@ -88,7 +89,10 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
         _check_same(place, settings)
         for left in folder.glob(".capture-*"):
             shutil.rmtree(left, ignore_errors=True)
+        begun(folder)
         yield place
+        ended(folder)
+        note(folder, done=True)
 
 
 def _check_same(place: Workplace, settings: CreateSettings) -> None:

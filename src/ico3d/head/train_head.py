@@ -36,6 +36,7 @@ from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.device import computing_device
 from ico3d.training.dry_run import Needs, needs_of
 from ico3d.training.loop import LoopSettings, Watch, run_loop
+from ico3d.training.notes.lock import lets_go
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
@@ -74,6 +75,7 @@ class HeadJob:
         return about
 
 
+@lets_go
 def train_head(
     capture: Capture,
     folder: Path,

@@ -15,6 +15,7 @@ from ico3d.scene.views import Frames, Only, SceneViews
 from ico3d.splat.device import computing_device
 from ico3d.training.dry_run import Needs, needs_of
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.notes.lock import lets_go
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
@@ -38,6 +39,7 @@ class SceneJob:
     settings: SceneSettings
 
 
+@lets_go
 def train_scene(
     capture: Capture, folder: Path, job: SceneJob, device: DeviceName = "auto"
 ) -> TrainedScene:

@@ -1,9 +1,12 @@
 """Checkpoints: tensors and a JSON state in one safetensors file, written atomically."""
 
+import hashlib
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -37,6 +40,14 @@ DAMAGED = (
 """What reading values out of a model's JSON and tensors raises where they are damaged."""
 ALIGNMENT = 8
 """The header of a safetensors file ends at a multiple of this many bytes."""
+SEAL = "sha256"
+"""Entry of a sealed file's metadata: the hash of the whole file with zeros in this place."""
+_SEALED = f'{{"__metadata__":{{"{SEAL}":"'.encode()
+"""How the header of a sealed file begins, behind its length in eight bytes."""
+_UNSEALED = b'{"__metadata__":{"state"'
+"""How that of a file without a hash begins."""
+_NO_SEAL = b"0" * 64
+_CHUNK = 1 << 20
 
 
 def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None:
@@ -47,7 +58,32 @@ def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None
     Raises:
         StorageError: If the disk is full; a file that was there before is kept.
     """
-    write_atomic(path, lambda temporary: _stream(temporary, tensors, state))
+    write_atomic(path, lambda temporary: _stream(temporary, tensors, {}, state))
+
+
+def save_sealed(
+    path: Path, tensors: Mapping[str, Tensor], state: dict, before: Path | None = None
+) -> None:
+    """Does as `save_tensors`, and adds a hash by which `load_sealed` finds any damage.
+
+    Args:
+        path: The file to write.
+        tensors: Tensors by name.
+        state: What else is to be kept; JSON-serialisable.
+        before: Name that a file which was there before gets; None replaces it.
+
+    Raises:
+        StorageError: If the disk is full; a file that was there before is kept.
+    """
+
+    def write(temporary: Path) -> None:
+        _stream(temporary, tensors, {SEAL: _NO_SEAL.decode()}, state)
+        with temporary.open("r+b") as file:
+            found = _hash(file)
+            file.seek(8 + len(_SEALED))
+            file.write(found)
+
+    write_atomic(path, write, before)
 
 
 def size_of_tensors(tensors: Mapping[str, Tensor]) -> int:
@@ -55,14 +91,14 @@ def size_of_tensors(tensors: Mapping[str, Tensor]) -> int:
     return sum(tensor.numel() * tensor.element_size() for tensor in tensors.values())
 
 
-def _stream(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None:
-    """Writes a safetensors file piece by piece.
+def _stream(path: Path, tensors: Mapping[str, Tensor], more: dict[str, str], state: dict) -> None:
+    """Writes a safetensors file piece by piece; its metadata begin with `more`.
 
     The functions of the safetensors package first copy all tensors of a GPU into memory.
     """
     # Wide numbers first: each tensor begins at a multiple of the size of its numbers.
     names = sorted(tensors, key=lambda name: (-tensors[name].element_size(), name))
-    header: dict[str, dict] = {"__metadata__": {"state": json.dumps(state)}}
+    header: dict[str, dict] = {"__metadata__": more | {"state": json.dumps(state)}}
     end = 0
     for name in names:
         tensor, begin = tensors[name], end
@@ -90,6 +126,36 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
         return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
 
 
+def load_sealed(path: Path) -> tuple[dict[str, Tensor], dict]:
+    """Reads what `save_sealed` wrote, or an earlier version without a hash.
+
+    Raises:
+        ModelError: As for `load_tensors`, and if anything in the file has changed.
+    """
+    check_seal(path)
+    return load_tensors(path)
+
+
+def check_seal(path: Path) -> None:
+    """Raises ModelError if the file is missing, no safetensors file, or has changed."""
+    with _opened(path, ""), path.open("rb") as file:
+        head = file.read(8 + len(_SEALED))
+        seal = file.read(len(_NO_SEAL))
+        sealed = head[8:] == _SEALED
+        if not (seal == _hash(file) if sealed else head[8:].startswith(_UNSEALED)):
+            raise ValueError("its content does not fit its hash")
+
+
+def _hash(file: BinaryIO) -> bytes:
+    """The hash of a sealed file, in hexadecimal digits."""
+    file.seek(0)
+    found = hashlib.sha256(file.read(8 + len(_SEALED)) + _NO_SEAL)
+    file.seek(len(_NO_SEAL), os.SEEK_CUR)
+    while chunk := file.read(_CHUNK):
+        found.update(chunk)
+    return found.hexdigest().encode()
+
+
 def placed(tensors: dict[str, Tensor], place: Callable[[str], torch.device]) -> dict[str, Tensor]:
     """Moves each tensor of a checkpoint to the device that `place` returns for its name.
 
@@ -108,13 +174,11 @@ def load_state(path: Path) -> dict:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[safe_open]:
+def _opened(path: Path, advice: str = ": train again") -> Iterator[safe_open]:
     try:
         if not path.is_file():
             raise ModelError(f"there is no model file at {path}.")
         with safe_open(path, framework="pt") as file:
             yield file
     except (SafetensorError, *DAMAGED) as error:
-        raise ModelError(
-            f"{path} is damaged or no file of ico3d ({error}): train again."
-        ) from error
+        raise ModelError(f"{path} is damaged or no file of ico3d ({error}){advice}.") from error

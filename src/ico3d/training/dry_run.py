@@ -83,8 +83,8 @@ class Needs:
 
     @property
     def disk(self) -> int:
-        """Most bytes on the disk at a time: the models, and a checkpoint beside the one before."""
-        return self.parts * self.end.kept + 2 * self.end.saved
+        """Most bytes on the disk at a time: the models, and a checkpoint beside two before."""
+        return self.parts * self.end.kept + 3 * self.end.saved
 
     def lines(self, folder: Path) -> list[str]:
         """Sentences for the user.
@@ -104,7 +104,7 @@ class Needs:
             "stay in memory",
             f"memory: up to {self.memory / GB:.2f} GB, with these pictures",
             f"disk: up to {self.disk / GB:.2f} GB (a checkpoint {self.end.saved / GB:.2f} GB, "
-            f"twice while it is replaced), {free / GB:.0f} GB are free",
+            f"three times while one is written), {free / GB:.0f} GB are free",
         ]
         if self.device_memory:
             lines.insert(3, f"memory of the GPU: up to {self.device_memory / GB:.2f} GB")

@@ -46,11 +46,21 @@ class MetricsLog:
 
 
 def _entries_before(path: Path, step: int) -> list[str]:
-    """The whole lines of a metrics file that belong to earlier steps."""
+    """The whole lines of a metrics file that belong to earlier steps.
+
+    What a disk has damaged is dropped: no training depends on it.
+    """
     if not path.exists():
         return []
-    lines = path.read_text().splitlines(keepends=True)
-    return [line for line in lines if line.endswith("\n") and json.loads(line)["step"] < step]
+    lines = path.read_text("utf-8", errors="replace").splitlines(keepends=True)
+    return [line for line in lines if line.endswith("\n") and _is_before(line, step)]
+
+
+def _is_before(line: str, step: int) -> bool:
+    try:
+        return json.loads(line)["step"] < step
+    except (ValueError, LookupError, TypeError):
+        return False
 
 
 def latest_entry(folder: Path) -> dict | None:
@@ -61,7 +71,10 @@ def latest_entry(folder: Path) -> dict | None:
             whole = file.read().rpartition(b"\n")[0]
     except FileNotFoundError:
         return None
-    return json.loads(whole.rpartition(b"\n")[2]) if whole else None
+    try:
+        return json.loads(whole.rpartition(b"\n")[2]) if whole else None
+    except ValueError:  # damaged by the disk
+        return None
 
 
 def readable(numbers: Mapping[str, float]) -> str:

@@ -87,11 +87,12 @@ def run_loop(
 
     Raises:
         ModelError: If the loss, a gradient or a parameter is no longer finite; the sentence names
-            the tensor, and the latest checkpoint is kept.
+            the tensor, and the latest checkpoint is kept. Or if all checkpoints are damaged.
         DeviceError: If the GPU fails; the latest checkpoint is kept.
         StorageError: If the disk is full; the latest checkpoint is kept.
     """
     with full_disk(run.path):
+        run.expect(settings.steps)
         return _run_steps(trainee, run, settings, watch)
 
 
@@ -144,8 +145,8 @@ def _check_loss(values: Mapping[str, float | Tensor], trainee: Trainee) -> None:
 
 
 def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:
-    """Restores the latest checkpoint; the step to go on with and the seconds spent before."""
-    checkpoint = run.checkpoint()
+    """Restores the latest usable checkpoint; its step, and the seconds spent until then."""
+    checkpoint = run.checkpoint(trainee.tensors().keys())
     if checkpoint is None:
         return 0, 0.0
     tensors, state = checkpoint

@@ -1,16 +1,26 @@
-"""The folder of one training run: settings, checkpoint, metrics."""
+"""The folder of one training run: settings, checkpoints, metrics."""
 
 import json
-from collections.abc import Mapping
+import logging
+from collections.abc import Mapping, Set
 from pathlib import Path
 
 from torch import Tensor
 
 from ico3d.common.files import remove_unfinished, write_atomic
 from ico3d.errors import ModelError, SettingsError
-from ico3d.training.checkpoint import load_state, load_tensors, save_tensors
+from ico3d.training.checkpoint import check_seal, load_sealed, load_state, save_sealed
+from ico3d.training.notes.lock import locked
+from ico3d.training.notes.state import begun, ended, note
 
-CHECKPOINT = "checkpoint.safetensors"
+log = logging.getLogger(__name__)
+
+SETTINGS, FINISHED = "settings.json", "finished.json"
+CHECKPOINT, BEFORE = "checkpoint.safetensors", "checkpoint.before.safetensors"
+CHECKPOINTS = (CHECKPOINT, BEFORE)
+"""The newest checkpoint, and the one before, for when the newest is damaged."""
+PARTS = ("step", "seconds", "trainee")
+"""What the state of a checkpoint tells."""
 NESTED = "settings"
 """Key under which the options of the command line are stored; older runs store them unnested."""
 
@@ -19,7 +29,7 @@ FREE = ("cache_gib", "cache_dir")
 
 
 class RunFolder:
-    """The files of one training run.
+    """The files of one training run, which no other process works at meanwhile.
 
     Attributes:
         path: The folder; created if missing.
@@ -31,19 +41,25 @@ class RunFolder:
         """Opens the folder for a run with these settings; removes unfinished files of killed runs.
 
         Raises:
-            SettingsError: If the folder holds a run with other settings.
+            SettingsError: If the folder holds a run with other settings, or another process works
+                at it.
+            ModelError: If the folder's settings are damaged.
         """
         self.path = path
         self.settings = json.loads(json.dumps(settings))
+        self._usable = True  # whether the newest checkpoint is
         self.path.mkdir(parents=True, exist_ok=True)
-        remove_unfinished(self.path)
-        if self.finished() is not None:  # killed after that was written
-            self._checkpoint_file.unlink(missing_ok=True)
-        file = path / "settings.json"
-        if not file.exists():
+        file = path / SETTINGS
+        if file.exists():
+            self._check_same(_read(file))
+        else:
             write_atomic(file, json.dumps(self.settings, indent=1).encode())
+        if self.finished() is not None:
+            self._drop_checkpoints()  # killed after that was written
             return
-        self._check_same(json.loads(file.read_text()))
+        self._lock = locked(file)
+        remove_unfinished(path)
+        begun(path)
 
     def _check_same(self, earlier: dict) -> None:
         """Raises SettingsError if the folder's run was started with other settings."""
@@ -61,28 +77,68 @@ class RunFolder:
                     f"{now.get(name)}): choose another folder, or remove it to start afresh."
                 )
 
-    @property
-    def _checkpoint_file(self) -> Path:
-        return self.path / CHECKPOINT
+    def checkpoint(self, names: Set[str] = frozenset()) -> tuple[dict[str, Tensor], dict] | None:
+        """Tensors and state of the latest checkpoint that can be used, or None before the first.
 
-    def checkpoint(self) -> tuple[dict[str, Tensor], dict] | None:
-        """Tensors and state of the latest checkpoint, or None before the first."""
-        file = self._checkpoint_file
-        return load_tensors(file) if file.exists() else None
+        Args:
+            names: Tensors that it must hold.
+
+        Raises:
+            ModelError: If there are checkpoints, and all of them are damaged; all are kept.
+        """
+        faults: list[ModelError] = []
+        for file in (self.path / name for name in CHECKPOINTS):
+            if not file.exists():
+                continue
+            try:
+                found = _checked(file, names)
+            except ModelError as error:
+                faults.append(error)
+                continue
+            if faults:
+                self._usable = False
+                log.warning(
+                    "%s Training goes on from the checkpoint before, at step %d.",
+                    faults[0],
+                    found[1]["step"],
+                )
+            return found
+        if faults:
+            raise ModelError(
+                f"{faults[0]} There is no other checkpoint that can be used in {self.path}: put a "
+                f"copy of {CHECKPOINT} there, or move the damaged ones away to begin afresh; "
+                "nothing was removed."
+            )
+        return None
 
     def save_checkpoint(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Replaces the checkpoint."""
-        save_tensors(self._checkpoint_file, tensors, state)
+        """Writes the newest checkpoint; the one before is kept, unless it is damaged."""
+        before = self.path / BEFORE if self._usable else None
+        save_sealed(self.path / CHECKPOINT, tensors, state, before)
+        self._usable = True
+
+    def expect(self, steps: int) -> None:
+        """Notes how many optimisation steps the run has."""
+        note(self.path, steps=steps)
 
     def finish(self, summary: dict) -> None:
-        """Marks the run as finished, with a summary, and deletes its checkpoint."""
-        write_atomic(self.path / "finished.json", json.dumps(summary, indent=1).encode())
-        self._checkpoint_file.unlink(missing_ok=True)
+        """Marks the run as finished, with a summary, and deletes its checkpoints."""
+        write_atomic(self.path / FINISHED, json.dumps(summary, indent=1).encode())
+        ended(self.path)
+        self._drop_checkpoints()
 
     def finished(self) -> dict | None:
-        """The summary of a finished run, or None."""
-        file = self.path / "finished.json"
-        return json.loads(file.read_text()) if file.exists() else None
+        """The summary of a finished run, or None.
+
+        Raises:
+            ModelError: If it is damaged.
+        """
+        file = self.path / FINISHED
+        return _read(file) if file.exists() else None
+
+    def _drop_checkpoints(self) -> None:
+        for name in CHECKPOINTS:
+            (self.path / name).unlink(missing_ok=True)
 
 
 def checkpoint_state(folder: Path) -> dict | None:
@@ -90,10 +146,64 @@ def checkpoint_state(folder: Path) -> dict | None:
 
     Unlike opening a `RunFolder`, this changes nothing in the folder, so the run may be going on.
     """
+    for name in CHECKPOINTS:
+        try:
+            return load_state(folder / name)
+        except ModelError:
+            continue
+    return None
+
+
+def usable_step(file: Path) -> int:
+    """After which step a checkpoint was written; the whole file is read for damage.
+
+    Raises:
+        ModelError: If it is damaged.
+    """
+    check_seal(file)
+    return _told(file, load_state(file))["step"]
+
+
+def _checked(file: Path, names: Set[str]) -> tuple[dict[str, Tensor], dict]:
+    """A checkpoint that holds what it must.
+
+    Raises:
+        ModelError: If it is damaged, or of another training.
+    """
+    tensors, state = load_sealed(file)
+    missing = sorted(names - tensors.keys())
+    if missing:
+        raise ModelError(f"{file} is of another training: it has no '{missing[0]}'.")
+    return tensors, _told(file, state)
+
+
+def _told(file: Path, state: object) -> dict:
+    """Raises ModelError if the state of a checkpoint lacks a part."""
+    if not isinstance(state, dict) or not state.keys() >= set(PARTS):
+        raise ModelError(f"{file} is no checkpoint of a training.")
+    return state
+
+
+def _read(file: Path) -> dict:
+    """The content of a JSON file.
+
+    Raises:
+        ModelError: If it is damaged.
+    """
     try:
-        return load_state(folder / CHECKPOINT)
-    except ModelError:
-        return None
+        found = json.loads(file.read_text("utf-8"))
+    except ValueError as error:
+        raise ModelError(_damaged(file)) from error
+    if not isinstance(found, dict):
+        raise ModelError(_damaged(file))
+    return found
+
+
+def _damaged(file: Path) -> str:
+    return (
+        f"{file} is damaged: put a copy of it there, or choose another folder to begin afresh; "
+        "nothing was removed."
+    )
 
 
 def _flat(settings: Mapping, prefix: str = "") -> dict[str, object]:

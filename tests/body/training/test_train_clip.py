@@ -110,6 +110,6 @@ def test_some_methods_take_the_clip_as_one_window(trained, tmp_path, method):
     body = train_body(trained[0], tmp_path / method, job(method))
     assert body.windows == (Window(0, FRAMES - 1),)
     written = {path.name for path in (tmp_path / method).iterdir()}
-    assert written == {"body.json", "finished.json", "settings.json", "windows"}
+    assert written == {"body.json", "finished.json", "settings.json", "state.json", "windows"}
     with pytest.raises(SettingsError, match=f"--method {method} takes the clip as one window"):
         plan_windows(trained[0], job(method), tmp_path / method)

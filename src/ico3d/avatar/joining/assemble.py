@@ -38,6 +38,7 @@ from ico3d.errors import CaptureError, ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.device import computing_device
 from ico3d.training.checkpoint import save_tensors
+from ico3d.training.notes.lock import lets_go
 from ico3d.training.run import RunFolder
 
 SEAM_REACH = 0.012
@@ -112,6 +113,7 @@ def prepare(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> Run
     return run
 
 
+@lets_go
 def assemble(
     capture: Capture, folder: Path, assembly: Assembly, say: Say, runner: Runner | None = None
 ) -> TrainedAvatar:

@@ -29,6 +29,7 @@ from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.notes.lock import lets_go
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
@@ -109,6 +110,7 @@ Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
 """Trains windows; returns the seconds spent in optimisation steps for each of them."""
 
 
+@lets_go
 def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     """Trains a window and writes its file, or continues an interrupted run of the same settings.
 
@@ -132,11 +134,8 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     capture = training_part(capture or open_capture(task.capture), job.hold_out)
     trainer, begin = window_trainer(task, capture)
     note_environment(task.folder, trainer.model.device)
-    loop = LoopSettings(
-        task.steps,
-        checkpoint_every=job.settings.checkpoint_every,
-        label=task.label,
-    )
+    every = job.settings.checkpoint_every
+    loop = LoopSettings(task.steps, checkpoint_every=every, label=task.label)
     seconds = run_loop(trainer, run, loop)
     save_window(task.file, trainer.model)
     summary = {"train_seconds": seconds, "num_gaussians": len(trainer.model)}
@@ -175,6 +174,7 @@ def _begin(
     return begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
 
 
+@lets_go
 def finetune_window(
     task: WindowTask, capture: Capture, trained: Path, previous: WindowModel
 ) -> float:
@@ -214,17 +214,15 @@ def finetune_window(
     tuner = FineTuner(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed, companion
     )
-    loop = LoopSettings(
-        job.settings.finetune.steps,
-        checkpoint_every=job.settings.checkpoint_every,
-        label=f"fine-tuning window {task.index}",
-    )
+    steps, every = job.settings.finetune.steps, job.settings.checkpoint_every
+    loop = LoopSettings(steps, checkpoint_every=every, label=f"fine-tuning window {task.index}")
     seconds = run_loop(tuner, run, loop)
     save_window(task.file, tuner.model)
     run.finish({"train_seconds": seconds, "num_gaussians": len(tuner.model)})
     return seconds
 
 
+@lets_go
 def train_body(
     capture: Capture, folder: Path, job: BodyJob, runner: Runner | None = None
 ) -> TrainedBody:
@@ -256,6 +254,7 @@ def train_body(
     if run.finished() is not None:
         return TrainedBody.load(folder)
     tasks, flow = window_tasks(capture, folder, job)
+    run.expect(sum(task.steps for task in tasks) + job.settings.finetune.steps * (len(tasks) - 1))
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     made = _made(job, tasks, flow)
     body = _save(capture, folder, job, tasks, seconds, made)
