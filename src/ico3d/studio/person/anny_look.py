@@ -115,6 +115,7 @@ def _appended(
         lip_mask=np.concatenate([subject.lip_mask, np.zeros(len(vertices), np.float32)]),
         delta_vertices=np.concatenate([subject.delta_vertices, count + moved]).astype(np.int32),
         deltas=np.concatenate([subject.deltas, subject.deltas[:, row[like[moved]]]], axis=1),
+        skeleton=subject.skeleton and subject.skeleton.of(np.append(np.arange(count), like)),
     )
 
 

