@@ -21,7 +21,7 @@ from ico3d.recording.keeping.plan import CONSENT, TURNS, UPLOAD, Turn
 from ico3d.recording.refusals import Refused, no_video
 
 SIDE = 512
-"""Upper limit of the short side, in pixels, of pictures that are looked at, as `ico3d create` has."""
+"""Upper limit of the short side of parts that are looked at, in pixels, as `ico3d create` has."""
 MOST_SIDE = 2000
 """Largest side of a picture that a page may send."""
 RATE = 3.0

@@ -133,8 +133,9 @@ class Person:
         self._parts.joinpath(f"{id}.json").unlink(missing_ok=True)  # what was said of the other one
         file.replace(kept)
         write_atomic(self._parts / f"{id}.json", json.dumps(report, indent=1).encode())
-        others = [] if before in (None, kept) else [before]
-        for other in (*others, *self._takes(id)):
+        if before is not None and before != kept:
+            before.unlink()
+        for other in self._takes(id):
             other.unlink()
         if id == CONSENT:
             self._state_spoken()

@@ -1,4 +1,4 @@
-"""The process in which a finished avatar talks: `python -m ico3d.recording.making.talk FILE HOST TLS`.
+"""The process in which an avatar talks: `python -m ico3d.recording.making.talk FILE HOST TLS`.
 
 It is `ico3d serve`, and ends with the process that started it.
 """
