@@ -247,7 +247,8 @@ export class Room {
     const ready = this.isReady(status);
     byId<HTMLButtonElement>(root, 'go').disabled = !ready || camera.isRecording;
     byId(root, 'first').hidden = ready;
-    if (!camera.isOpen) byId(root, 'guide').textContent = '';
+    if (!camera.isOpen) words.write(byId(root, 'guide'), '');
+    byId(root, 'reached').hidden ||= !camera.isOpen;
   }
 
   private isReady({ parts }: Status): boolean {

@@ -4,6 +4,7 @@ It ends with the process that started it, and whoever starts it again goes on wh
 """
 
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -50,10 +51,15 @@ def make(person: Person, quality: QualityName) -> Path:
         create(settings, tell)
         write_atomic(places.avatar, lambda file: _copy(places.made, file))
     except Ico3dError as error:
-        tell.change(state="failed", error=str(error).replace(f"{person.folder}/", ""))
+        tell.change(state="failed", error=_short(str(error), person.folder))
         raise
     tell.change(state="made")
     return places.avatar
+
+
+def _short(sentence: str, folder: Path) -> str:
+    """A sentence without the names of files that the person does not know."""
+    return re.sub(rf"{re.escape(str(folder))}/(\S+: )?", "", sentence)
 
 
 def _video(person: Person, places: Places) -> Path:
