@@ -36,6 +36,7 @@ const making = new MakingView(root, ports, signal);
 function problem(sentence: Sentence | null): void {
   const shown = byId(root, 'problem');
   shown.hidden = sentence === null;
+  shown.classList.remove('told');
   words.write(shown, sentence ?? '');
 }
 
@@ -83,7 +84,7 @@ async function showStart(): Promise<void> {
 
 /** The sentence to agree to, with the name as far as it is typed. */
 function showSentence(): void {
-  const name = byId<HTMLInputElement>(root, 'name').value.trim() || '…';
+  const name = byId<HTMLInputElement>(root, 'name').value.trim() || '____';
   byId(root, 'sentence').textContent = overview?.consent[words.language]?.replace('{name}', name) ?? '';
 }
 
@@ -123,6 +124,7 @@ byId(root, 'delete').onclick = async () => {
     await recordings.delete(name);
     await showStart();
     problem(say('studio.deleted', { name }));
+    byId(root, 'problem').classList.add('told');
   } catch (error) {
     failed(error);
   }

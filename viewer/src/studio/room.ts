@@ -46,7 +46,8 @@ export class Room {
     this.on('record', () => (this.camera.isRecording ? this.finish() : this.begin()));
     this.on('salvage', () => this.change((name, { id, take }) => ports.recordings.keep(name, id, take!)));
     this.on('remove', () => this.change((name, { id }) => ports.recordings.remove(name, id)));
-    this.on('play', async () => this.play());
+    this.on('next', async () => this.advance());
+    this.on('play', () => this.play());
     this.on('close', async () => byId<HTMLDialogElement>(root, 'shown').close());
     this.on('upload', async () => byId(root, 'file').click());
     byId<HTMLDialogElement>(root, 'shown').onclose = () => byId<HTMLVideoElement>(root, 'replay').removeAttribute('src');
@@ -75,7 +76,7 @@ export class Room {
     const other = status.name !== this.status?.name;
     this.status = status;
     byId(this.root, 'text').lang = status.language;
-    if (other || this.part?.state === 'kept') this.current = this.next(status);
+    if (other) this.current = this.next(status);
     this.write();
   }
 
@@ -93,6 +94,10 @@ export class Room {
   private next({ parts }: Status): string {
     const open = parts.filter(({ id, state }) => id !== UPLOAD && state !== 'kept');
     return (open[0] ?? parts[0]!).id;
+  }
+
+  private advance(): void {
+    this.select(this.next(this.status!));
   }
 
   private on(id: string, act: () => Promise<void>): void {
@@ -123,6 +128,7 @@ export class Room {
     this.ports.words.write(byId(this.root, 'clock'), say('studio.saving'));
     try {
       if (sending) this.ports.changed(await sending.keep());
+      if (this.part?.advice?.length === 0) this.advance(); // else it is read first
     } catch (error) {
       this.ports.failed(error);
       if (this.status) this.ports.changed(await this.ports.recordings.status(this.status.name));
@@ -146,10 +152,7 @@ export class Room {
 
   private async change(act: (name: string, part: Part) => Promise<Status>): Promise<void> {
     this.ports.problem(null);
-    const { current } = this;
-    const status = await act(this.status!.name, this.part!);
-    this.ports.changed(status);
-    this.select(current);
+    this.ports.changed(await act(this.status!.name, this.part!));
   }
 
   private async play(): Promise<void> {
@@ -240,6 +243,7 @@ export class Room {
     record.hidden = !camera.isOpen || part.id === UPLOAD;
     byId(root, 'open').hidden = camera.isOpen;
     byId(root, 'salvage').hidden = camera.isRecording || part.state !== 'broken';
+    byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || this.isComplete(status);
     byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
     byId(root, 'advice').replaceChildren(...(part.advice ?? []).map(item));
     byId(root, 'parts').replaceChildren(...status.parts.filter(isListed).map((one) => this.entry(one)));
@@ -256,15 +260,21 @@ export class Room {
     return kept.includes('consent') && kept.length > 1;
   }
 
+  private isComplete({ parts }: Status): boolean {
+    return parts.every(({ id, state }) => id === UPLOAD || state === 'kept');
+  }
+
   /** A part in the list: chosen by pressing it. */
   private entry(part: Part): HTMLLIElement {
     const { words } = this.ports;
     const [row, button, name, state] = (['li', 'button', 'span', 'span'] as const).map((tag) => document.createElement(tag));
     const number = /^text-(\d+)$/.exec(part.id)?.[1];
     words.write(name!, number ? say('studio.part.text', { n: Number(number) }) : say(`studio.part.${part.id}` as Key));
-    words.write(state!, say(`studio.state.${part.state}`, part.state === 'kept' ? { n: Math.round(10 * part.seconds!) / 10 } : undefined));
+    const shown = part.advice?.length ? 'better' : part.state;
+    words.write(state!, say(`studio.state.${shown}`, part.seconds === undefined ? undefined : { n: Math.round(10 * part.seconds) / 10 }));
     button!.dataset.part = part.id;
     button!.dataset.state = part.state;
+    button!.dataset.shown = shown;
     button!.ariaPressed = String(part.id === this.current);
     button!.append(name!, state!);
     button!.onclick = () => this.select(part.id);
