@@ -12,6 +12,8 @@ const ASKED = 1500; // ms between two questions how far it is
 export interface MakingPorts {
   words: PageWords;
   recordings: Recordings;
+  /** Something is wrong, or nothing any more. */
+  problem(sentence: Sentence | null): void;
   failed(error: unknown): void;
   changed(status: Status): void;
 }
@@ -23,6 +25,7 @@ export class MakingView {
   private status: Status | null = null;
   private faces = 0;
   private asking = false;
+  private lost = false; // the last question had no answer
 
   constructor(root: ParentNode, ports: MakingPorts, signal: AbortSignal) {
     this.root = root;
@@ -51,7 +54,12 @@ export class MakingView {
     this.asking = true;
     try {
       const now = await this.ports.recordings.status(status.name);
+      if (this.lost) this.ports.problem(null);
+      this.lost = false;
       if (this.status?.name === now.name) this.ports.changed(now);
+    } catch (error) {
+      this.lost = true;
+      throw error;
     } finally {
       this.asking = false;
     }

@@ -1,10 +1,12 @@
 """Starts and stops the processes that make avatars."""
 
+import contextlib
 import subprocess
 import threading
 from typing import cast
 
 from ico3d.creating.settings import QUALITIES, QualityName
+from ico3d.errors import StorageError
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import Person
 from ico3d.recording.keeping.plan import CONSENT
@@ -65,7 +67,8 @@ class Makers:
             return found
         why = "the making has ended unexpectedly: begin again, it goes on where it was."
         failed = Progress("failed", found.quality, found.step, found.share, error=why)
-        write_progress(folder, failed)
+        with contextlib.suppress(StorageError):  # that may be why
+            write_progress(folder, failed)
         return failed
 
     def stop(self, person: Person) -> None:
