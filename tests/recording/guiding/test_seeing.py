@@ -9,7 +9,7 @@ from PIL import Image
 from ico3d.capture.face.mediapipe_face import Face
 from ico3d.errors import MissingModelError
 from ico3d.recording.guiding import seeing
-from ico3d.recording.guiding.seeing import Eye, turn_of
+from ico3d.recording.guiding.seeing import Eye, short_of, turn_of
 from ico3d.recording.refusals import Refused
 from support.needs import needs
 from support.recordings.parts import part_file
@@ -88,6 +88,15 @@ def test_a_part_is_reported_with_its_turns(eye, tmp_path):
     assert report["turn"] == [0.0, 60.0, 0.0, 0.0]
     assert any("blurred" in text for text in report["advice"])
     assert not any("the video lasts" in text or "lips" in text for text in report["advice"])
+
+
+def test_a_turn_that_is_too_small_is_told(eye, tmp_path):
+    report = eye.report(part_file(tmp_path / "right.mp4"), "right")
+    assert report["advice"][-1] == "the head was turned to the right by 0°: 20° shows enough of it."
+    assert short_of("left", [0.0, 25.0, 0.0, 0.0]) == short_of("text-1", [0.0] * 4) == []
+    assert short_of("down", [0.0, 0.0, -4.5, 9.0]) == [
+        "the head was turned down by 4°: 9° shows enough of it."
+    ]
 
 
 def test_without_the_model_a_part_is_still_kept(blind, tmp_path):

@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import { afterAll, afterEach, beforeAll, expect, inject, test } from 'vitest';
 import { judge } from '../../support/browser/axe.ts';
 import { Browser } from '../../support/browser/browser.ts';
-import { runPython } from '../../support/python.ts';
+import { runFork, runPython } from '../../support/python.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { ChatServer } from '../../support/servers/server.ts';
 
@@ -17,8 +17,8 @@ let browser: Browser;
 
 beforeAll(async () => {
   if (!demo) return;
-  runPython('sound/voice.py', voice, 'I agree that an avatar is made', '0.3', 'of this recording');
-  runPython('references/sitter.py', voice, camera);
+  runPython('sound/voice.py', voice, 'I agree');
+  runFork('references/sitter.py', voice, camera);
   runPython('sound/voice.py', voice, ...Array<string>(8).fill('I agree that an avatar is made of this recording'));
   server = await ChatServer.studio(folder);
 });

@@ -196,6 +196,7 @@ export class Room {
     if (this.camera.isRecording) return;
     this.current = id;
     this.most = 0;
+    this.ports.words.write(byId(this.root, 'guide'), ''); // what was said was of another part
     this.write();
   }
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ico3d.recording.guiding.guide import shares
+from ico3d.recording.guiding.guide import extremes
 from ico3d.recording.keeping.person import Part
 from ico3d.recording.keeping.plan import CONSENT, TURNS, UPLOAD, Turn, scripts
 
@@ -39,13 +39,9 @@ def covered(parts: Iterable[Part], language: str) -> Coverage:
     kept = {part.id: part.report for part in parts if part.report is not None}
     turns: dict[Turn, float] = dict.fromkeys(TURNS, 0.0)
     for id, report in kept.items():
-        for turn in TURNS:
-            if report["turn"] is None:
-                turns[turn] = max(turns[turn], float(id == turn))
-            else:
-                right, left, down, up = report["turn"]
-                far = shares(left, up) if turn in ("left", "up") else shares(right, down)
-                turns[turn] = max(turns[turn], far[turn])
+        seen = report["turn"]
+        far = {turn: float(id == turn) for turn in TURNS} if seen is None else extremes(seen)
+        turns = {turn: max(turns[turn], far[turn]) for turn in TURNS}
     heard: set[str] = set()
     for number, sounds in enumerate(script.heard, 1):
         if f"text-{number}" in kept:

@@ -1,5 +1,6 @@
 """What to tell somebody before the camera: one instruction at a time, the most urgent one."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -77,6 +78,17 @@ def shares(to_left: float, up: float) -> dict[Turn, float]:
     """
     degrees: dict[Turn, float] = {"left": to_left, "right": -to_left, "up": up, "down": -up}
     return {turn: min(max(degrees[turn] / GOALS[turn], 0.0), 1.0) for turn in TURNS}
+
+
+def extremes(turn: Sequence[float]) -> dict[Turn, float]:
+    """How far a head was turned each way in a part, as a share of the goal, 0 to 1.
+
+    Args:
+        turn: Degrees: least to the left, most, least up, most.
+    """
+    right, left, down, up = turn
+    most, least = shares(left, up), shares(right, down)
+    return {way: max(most[way], least[way]) for way in TURNS}
 
 
 def _fault(sample: Sample, size: int) -> Word | None:

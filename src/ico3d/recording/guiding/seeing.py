@@ -16,7 +16,7 @@ from ico3d.creating.looking.picture_checks import picture_advice
 from ico3d.creating.looking.samples import Samples, sample_of, sharpness_of
 from ico3d.creating.looking.sound_checks import sound_advice
 from ico3d.errors import CaptureError, Ico3dError, MissingExtraError, MissingModelError
-from ico3d.recording.guiding.guide import Told, instruct, without_faces
+from ico3d.recording.guiding.guide import GOALS, Told, extremes, instruct, without_faces
 from ico3d.recording.keeping.plan import CONSENT, TURNS, UPLOAD, Turn
 from ico3d.recording.refusals import Refused, no_video
 
@@ -111,6 +111,7 @@ class Eye:
             raise CaptureError(f"{file} is a picture.")
         left_out = () if id == UPLOAD else OF_A_WHOLE
         said = [str(one) for one in (*seen, *heard) if one.topic not in left_out]
+        said += short_of(id, turn)
         return {"seconds": round(video.times[-1], 2), "turn": turn, "advice": said}
 
     def _samples(self, video: Any) -> Samples:
@@ -126,6 +127,16 @@ class Eye:
 def turn_of(text: str) -> Turn | None:
     """The way to turn the head in a part; None for one in which the person looks ahead."""
     return next((turn for turn in TURNS if turn == text), None)
+
+
+def short_of(id: str, turn: list[float] | None) -> list[str]:
+    """What is said of a turn of the head that did not go far enough; nothing of any other part."""
+    way = turn_of(id)
+    if way is None or turn is None or (share := extremes(turn)[way]) >= 1:
+        return []
+    goal = GOALS[way]
+    where = {"left": "to the left", "right": "to the right", "up": "up", "down": "down"}[way]
+    return [f"the head was turned {where} by {share * goal:.0f}°: {goal:.0f}° shows enough of it."]
 
 
 def _of_consent(file: Path) -> dict[str, Any]:
