@@ -24,7 +24,7 @@ from ico3d.recording.guiding.coverage import covered
 from ico3d.recording.guiding.seeing import Eye, turn_of
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import Person
-from ico3d.recording.keeping.plan import part_ids, scripts
+from ico3d.recording.keeping.plan import CONSENT, part_ids, scripts
 from ico3d.recording.making.makers import Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE
@@ -149,6 +149,8 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         data = await _body(request, LARGEST_CHUNK)
         async with room.locks[name]:
             person = room.people.person(name)
+            if id != CONSENT:
+                person.check_spoken()
             room.people.check_room()
             size = await asyncio.to_thread(person.append, id, take, offset, data)
         return JSONResponse({"size": size})

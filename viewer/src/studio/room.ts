@@ -92,7 +92,7 @@ export class Room {
 
   /** The part after the current one that was not recorded yet; the current one if all were. */
   private next({ parts }: Status): string {
-    const open = parts.filter(({ id, state }) => id !== UPLOAD && state !== 'kept');
+    const open = parts.filter(({ id, state }) => id !== UPLOAD && state !== 'kept'); // consent is the first of all
     return (open[0] ?? parts[0]!).id;
   }
 
@@ -252,13 +252,18 @@ export class Room {
     const ready = this.isReady(status);
     byId<HTMLButtonElement>(root, 'go').disabled = !ready || camera.isRecording;
     byId(root, 'first').hidden = ready;
+    byId<HTMLButtonElement>(root, 'upload').disabled = !this.isAgreed;
     if (!camera.isOpen) words.write(byId(root, 'guide'), '');
     byId(root, 'reached').hidden ||= !camera.isOpen;
   }
 
+  /** Whether the person said that they agree: that comes before all else. */
+  private get isAgreed(): boolean {
+    return this.status!.parts.some(({ id, state }) => id === 'consent' && state === 'kept');
+  }
+
   private isReady({ parts }: Status): boolean {
-    const kept = parts.filter(({ state }) => state === 'kept').map(({ id }) => id);
-    return kept.includes('consent') && kept.length > 1;
+    return this.isAgreed && parts.filter(({ state }) => state === 'kept').length > 1;
   }
 
   private isComplete({ parts }: Status): boolean {
@@ -277,6 +282,7 @@ export class Room {
     button!.dataset.state = part.state;
     button!.dataset.shown = shown;
     button!.ariaPressed = String(part.id === this.current);
+    (button as HTMLButtonElement).disabled = part.id !== 'consent' && !this.isAgreed;
     button!.append(name!, state!);
     button!.onclick = () => this.select(part.id);
     row!.append(button!);

@@ -61,6 +61,15 @@ class Person:
         except (OSError, ValueError) as error:
             raise Refused("unknown", f"the consent of {self.name} cannot be read.", 404) from error
 
+    def check_spoken(self) -> None:
+        """Refuses to go on before the person said aloud that they agree.
+
+        Raises:
+            Refused: If that part was not recorded.
+        """
+        if self._kept(CONSENT) is None:
+            raise Refused("unspoken", "say first that you agree: record that part.", 409)
+
     def parts(self) -> Iterator[Part]:
         """All parts, kept ones and those whose recording broke off."""
         for id in sorted(ALL_IDS):

@@ -37,10 +37,8 @@ class Makers:
         """
         if quality not in QUALITIES:
             raise Refused("quality", f"there is no quality {quality[:20]!r}.")
-        kept = {part.id for part in person.parts() if part.report is not None}
-        if CONSENT not in kept:
-            raise Refused("unspoken", "say first that you agree: record that part.", 409)
-        if not kept - {CONSENT}:
+        person.check_spoken()
+        if not {part.id for part in person.parts() if part.report is not None} - {CONSENT}:
             said = "nothing is recorded: record some parts, or choose a video."
             raise Refused("nothing", said, 409)
         with self._lock:
