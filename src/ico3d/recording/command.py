@@ -68,6 +68,8 @@ class Studio:
         print(f"Recordings and avatars are in {self.folder}")
         if room.eye.lacking:
             print(f"Without guidance by the face: {room.eye.lacking}", file=sys.stderr)
+        if not (server.STATIC / "studio.html").is_file():
+            print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()
         if self.browser:
             webbrowser.open(f"{url}{fragment(key)}")
