@@ -56,6 +56,14 @@ class Room:
     talks: Talks
     locks: defaultdict[str, asyncio.Lock]
 
+    def lock(self, name: str) -> asyncio.Lock:
+        """What whoever writes or deletes files of a person has to hold.
+
+        Raises:
+            Refused: If there is nobody of this name.
+        """
+        return self.locks[self.people.person(name).name]
+
 
 def make_app(room: Room, host: str, sites: Sites, names: tuple[str, ...] = ()) -> Guard:
     """The application of the server.
@@ -133,7 +141,7 @@ def _add_people(app: FastAPI, room: Room) -> None:
     @app.delete(ROOT + "{name}")
     async def delete(name: str) -> Response:
         person = room.people.person(name)
-        async with room.locks[person.name]:
+        async with room.lock(name):
             await asyncio.to_thread(room.makers.stop, person)
             await asyncio.to_thread(room.talks.stop, person.name)
             await asyncio.to_thread(room.people.delete, person.name)
@@ -147,7 +155,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
     @app.post(takes)
     async def append(name: str, id: str, take: str, offset: int, request: Request) -> Response:
         data = await _body(request, LARGEST_CHUNK)
-        async with room.locks[name]:
+        async with room.lock(name):
             person = room.people.person(name)
             if id != CONSENT:
                 person.check_spoken()
@@ -165,7 +173,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
             if error.code == "no-video":
                 person.discard(id, take)
             raise
-        async with room.locks[name]:
+        async with room.lock(name):
             room.people.person(name)  # may be deleted by now
             await asyncio.to_thread(person.keep, id, take, report)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
@@ -180,7 +188,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
 
     @app.delete(part)
     async def remove(name: str, id: str) -> Response:
-        async with room.locks[name]:
+        async with room.lock(name):
             person = room.people.person(name)
             await asyncio.to_thread(person.remove, id)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
@@ -201,7 +209,7 @@ def _add_making(app: FastAPI, room: Room) -> None:
     async def make(name: str, request: Request) -> Response:
         quality = str((await _form(request)).get("quality"))
         person = room.people.person(name)
-        async with room.locks[name]:
+        async with room.lock(name):
             await asyncio.to_thread(room.talks.stop, person.name)
             await asyncio.to_thread(room.makers.begin, person, quality)
         return JSONResponse(await asyncio.to_thread(_status, room, person))

@@ -12,7 +12,7 @@ from ico3d.recording.keeping.person import Person
 from ico3d.recording.keeping.plan import CONSENT
 from ico3d.recording.making.beside import start, stop
 from ico3d.recording.making.places import Places
-from ico3d.recording.making.progress import Progress, read_progress, write_progress
+from ico3d.recording.making.progress import Progress, begun, read_progress, write_progress
 from ico3d.recording.refusals import Refused
 
 WORKER = "ico3d.recording.making.worker"
@@ -47,9 +47,7 @@ class Makers:
                 raise Refused("busy", f"an avatar of {busy[0]} is being made: wait for it.", 409)
             folder = Places(person.folder).folder
             folder.mkdir(exist_ok=True)
-            before = read_progress(folder)
-            faces = before.faces if before else 0
-            write_progress(folder, Progress("running", cast(QualityName, quality), faces=faces))
+            write_progress(folder, begun(folder, cast(QualityName, quality)))
             with (folder / LOG).open("ab") as log:
                 words = [str(person.folder), quality]
                 self._running[person.name] = start(self._worker, words, log)

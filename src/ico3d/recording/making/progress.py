@@ -56,6 +56,12 @@ def read_progress(folder: Path) -> Progress | None:
         return None
 
 
+def begun(folder: Path, quality: QualityName) -> Progress:
+    """The progress of a making that begins, or goes on: with the pictures that there are."""
+    before = read_progress(folder)
+    return Progress("running", quality, faces=0 if before is None else before.faces)
+
+
 def write_progress(folder: Path, progress: Progress) -> None:
     """Writes the progress into a folder.
 

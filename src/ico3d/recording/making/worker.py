@@ -19,7 +19,7 @@ from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
 from ico3d.recording.making.beside import end_with_parent
 from ico3d.recording.making.joining import join
 from ico3d.recording.making.places import Places
-from ico3d.recording.making.progress import Progress, Reporter
+from ico3d.recording.making.progress import Reporter, begun
 
 
 def make(person: Person, quality: QualityName) -> Path:
@@ -36,7 +36,7 @@ def make(person: Person, quality: QualityName) -> Path:
         Ico3dError: As for `create`, and if there is no recording.
     """
     places, about = Places(person.folder), person.consent()
-    tell = Reporter(places.folder, Progress("running", quality))
+    tell = Reporter(places.folder, begun(places.folder, quality))
     tell.change()
     try:
         video = _video(person, places)
