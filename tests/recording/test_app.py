@@ -14,7 +14,7 @@ from ico3d.recording.keeping.person import Person
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE, Progress, write_progress
 from support.needs import needs
-from support.recordings.parts import part_file
+from support.studio_page.parts import part_file
 
 pytestmark = needs("av")
 KEY = "abcd-efgh-ijkl-mnop"

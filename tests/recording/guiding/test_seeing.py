@@ -12,7 +12,7 @@ from ico3d.recording.guiding import seeing
 from ico3d.recording.guiding.seeing import Eye, short_of, turn_of
 from ico3d.recording.refusals import Refused
 from support.needs import needs
-from support.recordings.parts import part_file
+from support.studio_page.parts import part_file
 
 pytestmark = [needs("av"), needs("cv2")]
 

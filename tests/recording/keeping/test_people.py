@@ -9,7 +9,7 @@ from ico3d.common.people.stated import is_stated
 from ico3d.recording.keeping import people as room
 from ico3d.recording.keeping.people import People
 from ico3d.recording.refusals import Refused
-from support.recordings.parts import DAY, begun, kept
+from support.studio_page.parts import DAY, begun, kept
 
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)
 

@@ -7,7 +7,7 @@ from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError
 from ico3d.recording.making.joining import join
 from support.needs import needs
-from support.recordings.parts import part_file
+from support.studio_page.parts import part_file
 
 pytestmark = needs("av")
 

@@ -11,9 +11,9 @@ from ico3d.recording.making.makers import Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, read_progress, write_progress
 from ico3d.recording.refusals import Refused
-from support.recordings.parts import begun, kept
+from support.studio_page.parts import begun, kept
 
-WORKER = "support.recordings.pretended_worker"
+WORKER = "support.studio_page.pretended_worker"
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)
 
 

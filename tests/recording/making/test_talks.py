@@ -13,7 +13,7 @@ from ico3d.recording.refusals import Refused
 @pytest.fixture
 def avatar(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))  # of the tests
-    monkeypatch.setattr(talks, "TALK", "support.recordings.pretended_talk")
+    monkeypatch.setattr(talks, "TALK", "support.studio_page.pretended_talk")
     file = tmp_path / "Ida.ico3d"
     file.write_bytes(b"avatar")
     return file

@@ -8,7 +8,7 @@ from ico3d.recording.making import worker
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import read_progress
 from support.needs import needs
-from support.recordings.parts import begun, kept, part_file
+from support.studio_page.parts import begun, kept, part_file
 
 pytestmark = needs("av")
 
