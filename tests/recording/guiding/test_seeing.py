@@ -90,6 +90,13 @@ def test_a_part_is_reported_with_its_turns(eye, tmp_path):
     assert not any("the video lasts" in text or "lips" in text for text in report["advice"])
 
 
+def test_pictures_that_would_fill_the_memory_are_not_decoded(eye, tmp_path, monkeypatch):
+    file = part_file(tmp_path / "left.mp4")
+    monkeypatch.setattr(seeing, "MOST_PIXELS", 64 * 64 - 1)
+    with pytest.raises(Refused, match="larger than is taken"):
+        eye.report(file, "left")
+
+
 def test_a_turn_that_is_too_small_is_told(eye, tmp_path):
     report = eye.report(part_file(tmp_path / "right.mp4"), "right")
     assert report["advice"][-1] == "the head was turned to the right by 0°: 20° shows enough of it."

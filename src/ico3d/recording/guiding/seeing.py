@@ -24,6 +24,8 @@ SIDE = 512
 """Upper limit of the short side of parts that are looked at, in pixels, as `ico3d create` has."""
 MOST_SIDE = 2000
 """Largest side of a picture that a page may send."""
+MOST_PIXELS = 8192 * 4320
+"""Largest size of a video's pictures: what cameras record at most."""
 RATE = 3.0
 """Pictures per second of a part that are looked at."""
 MIDDLE = 0.3
@@ -93,6 +95,7 @@ class Eye:
             raise no_video() from error
 
     def _found(self, file: Path, id: str) -> dict[str, Any]:
+        _check_size(file)
         video = open_video(file, SIDE)
         heard = sound_advice(read_sound(file))
         seen: list[Advice] = []
@@ -127,6 +130,20 @@ class Eye:
 def turn_of(text: str) -> Turn | None:
     """The way to turn the head in a part; None for one in which the person looks ahead."""
     return next((turn for turn in TURNS if turn == text), None)
+
+
+def _check_size(file: Path) -> None:
+    """Refuses a video whose pictures would fill the memory, before one is decoded.
+
+    Raises:
+        Refused: If its file states more pixels than `MOST_PIXELS`.
+    """
+    import av
+
+    with av.open(str(file), metadata_errors="replace") as container:
+        sizes = [stream.width * stream.height for stream in container.streams.video]
+    if max(sizes, default=0) > MOST_PIXELS:
+        raise Refused("large", "the pictures of this video are larger than is taken.", 413)
 
 
 def short_of(id: str, turn: list[float] | None) -> list[str]:
