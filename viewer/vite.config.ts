@@ -15,7 +15,7 @@ export default defineConfig({
     emptyOutDir: true,
     target: 'es2023',
     rolldownOptions: {
-      input: { index: 'index.html', check: 'check.html', embed: 'src/embed/served.ts' },
+      input: { index: 'index.html', check: 'check.html', studio: 'studio.html', embed: 'src/embed/served.ts' },
       preserveEntrySignatures: 'exports-only', // of what other sites import
       // Other sites write its address into their pages: it stays, and imports what changes.
       output: {
@@ -34,7 +34,7 @@ export default defineConfig({
     chunkSizeWarningLimit: 3000, // Spark, with its sort worker
   },
   server: {
-    proxy: { '/bundle': SERVER, '/health': SERVER, '/echo': { target: SERVER, ws: true }, '/ws': { target: SERVER, ws: true } },
+    proxy: { '/bundle': SERVER, '/recordings': SERVER, '/health': SERVER, '/echo': { target: SERVER, ws: true }, '/ws': { target: SERVER, ws: true } },
   },
   test: {
     globalSetup: 'support/scratch.ts',

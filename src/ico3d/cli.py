@@ -25,6 +25,7 @@ class Verb:
 VERBS: dict[str, Verb] = {
     "demo": Verb("ico3d.chat.commands", "Demo", "talk with the avatar that comes in the package"),
     "create": Verb("ico3d.creating.command", "Create", "make an avatar of a video of somebody"),
+    "studio": Verb("ico3d.recording.command", "Studio", "record yourself on a page, get an avatar"),
     "capture portrait": Verb("ico3d.capture.commands", "Portrait", "track a talking-head video"),
     "capture synthetic": Verb("ico3d.studio.command", "Synthetic", "record a synthetic person"),
     "capture import": Verb(

@@ -45,7 +45,7 @@ def test_whoever_comes_by_a_name_shows_a_key(served, capsys):
     status, guard = served("--name", "talk.example")
     told = capsys.readouterr().out
     assert status == 0 and guard._sites.is_key(key_in(told))
-    assert "who has the key can talk" in told
+    assert "who has the key gets in" in told
 
 
 def test_nobody_else_shows_one(served, capsys):

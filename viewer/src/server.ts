@@ -36,6 +36,17 @@ export class Server {
     return new URL('check', this.base).href;
   }
 
+  /**
+   * Address below the recordings of a studio page's server.
+   *
+   * @param path names, each of them encoded
+   */
+  recordings(path: string, values: Record<string, string> = {}): string {
+    const url = this.address(`recordings/${path}`);
+    for (const [name, value] of Object.entries(values)) url.searchParams.set(name, value);
+    return url.href;
+  }
+
   /** Address of the server's WebSocket. */
   socket(): string {
     return this.webSocket('ws');

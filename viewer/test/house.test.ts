@@ -24,7 +24,7 @@ const ORDER = [
   ['talk'],
   ['ui', 'cast.ts', 'painters'],
   ['xr', 'theatre.ts'],
-  ['visit.ts', 'check'],
+  ['visit.ts', 'check', 'studio'],
   ['bench.ts'],
   ['main.ts', 'embed'],
 ];

@@ -180,3 +180,13 @@ def test_what_cannot_be_removed_is_named(project, monkeypatch, capsys):
     assert main(["forget", "captures/face", "ada.ico3d", "--yes"]) == 1
     assert f"{project}/captures/face (Permission denied)" in capsys.readouterr().err
     assert "ada.ico3d" not in there(project)
+
+
+def test_what_the_studio_page_recorded_is_found_by_name(project):
+    folder = project / "recordings" / "Ada"
+    (folder / "parts").mkdir(parents=True)
+    (folder / "parts" / "text-1.webm").write_bytes(b"a film")
+    (folder / "consent.json").write_text(json.dumps({"likeness": "Ada", "sources": []}))
+    bundle(folder / "Ada.ico3d", "Ada")
+    assert main(["forget", "Ada", "--yes"]) == 0
+    assert not folder.exists()

@@ -1,5 +1,6 @@
 import '../ui/style/page.css';
 import '../ui/style/buttons.css';
+import '../ui/style/scrolling.css';
 import '../ui/style/theme.css';
 import './check.css';
 import { Server } from '../server.ts';

@@ -1,15 +1,23 @@
+import type studio from './studio.json';
 import texts from './texts.json';
 
 /** The languages of the page, by their own names. */
 export const LANGUAGES = { en: 'English', de: 'Deutsch', fr: 'Français', es: 'Español', zh: '中文', ja: '日本語' } as const;
 
 export type Language = keyof typeof LANGUAGES;
-export type Key = keyof typeof texts;
+export type Key = keyof typeof texts | keyof typeof studio;
 
 /** Words with `{name}` for each value; of several forms, the value `n` decides. */
 type Text = string | ({ other: string } & Partial<Record<Intl.LDMLPluralRule, string>>);
 
-const TEXTS: Readonly<Record<Key, Readonly<Record<Language, Text>>>> = texts; // fails where a translation is missing
+type Texts = Readonly<Record<string, Readonly<Record<Language, Text>>>>; // fails where a translation is missing
+
+let TEXTS: Texts = texts;
+
+/** Adds the sentences of a page that most visitors never see (`studio.json`). */
+export function addTexts(more: Texts): void {
+  TEXTS = { ...TEXTS, ...more };
+}
 
 export type Values = Readonly<Record<string, string | number | Message | readonly string[]>>;
 
@@ -39,7 +47,7 @@ export function textOf(sentence: Sentence, language: Language): string {
   if (typeof sentence === 'string') return sentence;
   const { key, values = {}, english } = sentence;
   if (language === 'en' && english) return english;
-  const text = TEXTS[key][language];
+  const text = TEXTS[key]![language];
   return formOf(text, values, language).replace(/\{(\w+)\}/g, (_, name: string) => valueOf(values[name], language));
 }
 

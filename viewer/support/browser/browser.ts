@@ -42,6 +42,14 @@ const MICROPHONE = [
   '--use-fake-ui-for-media-stream',
   `--use-file-for-fake-audio-capture=${HEARD}%noloop`,
 ];
+/** What the fake camera shows, again and again, from the first time that it is opened. */
+const SEEN = join(scratchFolder(), 'camera.mjpeg');
+const FLAGS_OF: Record<Kind, string[]> = {
+  plain: FLAGS,
+  hearing: [...FLAGS, ...MICROPHONE],
+  seeing: [...FLAGS, ...MICROPHONE, `--use-file-for-fake-video-capture=${SEEN}`],
+};
+type Kind = 'plain' | 'hearing' | 'seeing';
 
 /** How a browser is opened. */
 export interface BrowserOptions {
@@ -49,17 +57,18 @@ export interface BrowserOptions {
   height?: number;
   calm?: boolean; // the visitor wants little motion: the head does not sway
   microphone?: string; // WAV that plays as the microphone, once
+  camera?: string; // Motion JPEG that is seen as the camera, the same in all tests of a file; with a microphone
   hertz?: 30 | 60; // how often the screen is refreshed; each further picture takes the processor from what is tested
 }
 
-/** Chromium without and with a microphone; each process of tests starts them once, they end with it. */
-const running = new Map<boolean, Promise<Chromium>>();
+/** Chromium without and with devices; each process of tests starts them once, they end with it. */
+const running = new Map<Kind, Promise<Chromium>>();
 
-function start(hasMicrophone: boolean): Promise<Chromium> {
+function start(kind: Kind): Promise<Chromium> {
   return chromium.launch({
     executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
     headless: false, // the flag says it: playwright's own switch picks another build
-    args: hasMicrophone ? [...FLAGS, ...MICROPHONE] : FLAGS,
+    args: FLAGS_OF[kind],
   });
 }
 
@@ -99,9 +108,10 @@ export class Browser {
   }
 
   static async launch(options: BrowserOptions = {}): Promise<Browser> {
-    const { width = 320, height = 240, calm = false, microphone, hertz = 30 } = options;
+    const { width = 320, height = 240, calm = false, microphone, camera, hertz = 30 } = options;
     if (microphone) copyFileSync(microphone, HEARD);
-    const kind = microphone !== undefined;
+    if (camera) copyFileSync(camera, SEEN);
+    const kind = camera ? 'seeing' : microphone ? 'hearing' : 'plain';
     if (!running.has(kind)) running.set(kind, start(kind));
     const context = await (await running.get(kind)!).newContext({
       viewport: { width, height },

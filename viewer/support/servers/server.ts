@@ -4,7 +4,7 @@ import { ENVIRONMENT, PYTHON, REPOSITORY } from '../python.ts';
 
 const START_TIMEOUT = 60_000; // ms
 
-/** `ico3d serve` with a bundle, on a free port of this machine. */
+/** `ico3d serve` with a bundle, or `ico3d studio` with a folder, on a free port of this machine. */
 export class ChatServer {
   private readonly child: ChildProcess;
   readonly url: string;
@@ -15,8 +15,17 @@ export class ChatServer {
   }
 
   /** @param more arguments of `ico3d serve` */
-  static async start(bundle: string, port = 0, ...more: string[]): Promise<ChatServer> {
-    const args = ['-m', 'ico3d.cli', 'serve', bundle, '--port', String(port), ...more];
+  static start(bundle: string, port = 0, ...more: string[]): Promise<ChatServer> {
+    return ChatServer.run(['serve', bundle, '--port', String(port), ...more]);
+  }
+
+  /** @param folder where the recordings are */
+  static studio(folder: string, port = 0): Promise<ChatServer> {
+    return ChatServer.run(['studio', folder, '--port', String(port), '--no-browser']);
+  }
+
+  private static async run(words: string[]): Promise<ChatServer> {
+    const args = ['-m', 'ico3d.cli', ...words];
     const child = spawn(PYTHON, args, { cwd: REPOSITORY, env: ENVIRONMENT, stdio: ['ignore', 'pipe', 'inherit'] });
     return new ChatServer(child, await readUrl(child));
   }

@@ -22,6 +22,7 @@ RECORDINGS = {
     "transforms_train.json": "ico3d.json",
     "cameras.json": "cameras.json",
     "capture.json": "capture.json",
+    "consent.json": "consent.json",
 }
 """Files that mark folders of recordings, and those that say of whom: also of incomplete ones.
 

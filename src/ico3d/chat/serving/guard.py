@@ -38,6 +38,7 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
+WITH_CAMERA = "microphone=(self), camera=(self), geolocation=()"
 FOREIGN = "This server answers only its own pages: open it under the address it printed.\n"
 NO_TOKEN = "The page's token is missing or has expired.\n"
 TOO_MANY = "This machine has too many connections open.\n"
@@ -51,7 +52,12 @@ class Guard:
     """
 
     def __init__(
-        self, app: ASGIApp, host: str, sites: Sites | None = None, names: Collection[str] = ()
+        self,
+        app: ASGIApp,
+        host: str,
+        sites: Sites | None = None,
+        names: Collection[str] = (),
+        camera: bool = False,
     ):
         """Wraps `app`, which is bound to the address `host`.
 
@@ -60,7 +66,9 @@ class Guard:
             host: Address to which it is bound.
             sites: Sites that may embed the avatar; by default none.
             names: Further host names of the server.
+            camera: Whether its pages may ask for the camera.
         """
+        self._headers = HEADERS | ({"Permissions-Policy": WITH_CAMERA} if camera else {})
         self._app = app
         self._host = host
         self._sites = sites or Sites()
@@ -82,7 +90,7 @@ class Guard:
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 policy = f"{CONTENT_POLICY}; frame-ancestors {self._sites.ancestors}"
-                own = HEADERS | {"Content-Security-Policy": policy}
+                own = self._headers | {"Content-Security-Policy": policy}
                 answer = MutableHeaders(scope=message)
                 for name, value in (own | self._sites.headers(origin, path)).items():
                     if name == "Vary":

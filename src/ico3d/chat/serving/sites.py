@@ -19,7 +19,7 @@ from ico3d.errors import SettingsError
 
 EMBEDDED = ("/ws", "/embed.js", "/assets/", "/bundle/")
 """What listed sites may load: a path, or all below it."""
-PROTECTED = ("/ws", "/bundle/")
+PROTECTED = ("/ws", "/bundle/", "/recordings/")
 """What needs a token where there is a key."""
 SHORTEST_KEY = 16  # characters
 OWN_KEY = 16  # characters of a key that a server makes itself: 80 bits

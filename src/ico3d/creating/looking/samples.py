@@ -98,7 +98,7 @@ def sampled(video: Video, reached: Callable[[float], None]) -> Samples:
     found = []
     with _readers() as (faces, hands):
         for number, picture in enumerate(video.frames(rate)):
-            found.append(_sample(number / rate, picture, faces, hands))
+            found.append(sample_of(number / rate, picture, faces, hands))
             if seconds:
                 reached(min((number + 1) / (seconds * rate), 1.0))
     return Samples(tuple(found), 1 / rate, min(video.width, video.height), hands is not None)
@@ -118,7 +118,7 @@ def _readers() -> Iterator[tuple[FaceReader, HandReader | None]]:
             hands.close()
 
 
-def _sample(
+def sample_of(
     second: float, picture: np.ndarray, faces: FaceReader, hands: HandReader | None
 ) -> Sample:
     """What one picture, uint8 RGB (H, W, 3), shows."""
@@ -137,7 +137,7 @@ def _sample(
         faces=len(found),
         light=float(crop.mean()),
         burnt=float((crop > 0.98).mean()),
-        sharpness=_sharpness(crop),
+        sharpness=sharpness_of(crop),
         width=_width(face),
         inside=bool((low >= 0).all() and high[0] <= grey.shape[1] and high[1] <= grey.shape[0]),
         hands=any(_before(hand.pixels, face) for hand in seen_hands),
@@ -161,7 +161,7 @@ def _cut(grey: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return grey[y0:y1, x0:x1]
 
 
-def _sharpness(crop: np.ndarray) -> float:
+def sharpness_of(crop: np.ndarray) -> float:
     """Root mean square of the Laplacian of a face (h, w), relative to its contrast."""
     import cv2
 

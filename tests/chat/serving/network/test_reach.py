@@ -65,7 +65,7 @@ def test_a_phone_is_told_an_address_that_the_certificate_and_the_server_accept(t
     assert not is_own("evil.example:8765", None, "0.0.0.0", found.answered)
     assert not is_own("box:8765", "https://evil.example:8765", "0.0.0.0", found.answered)
     told = "\n".join(found.told(8765, "abcd-efgh"))
-    assert "who has the key can talk" in told and found.certificate.fingerprint in told
+    assert "who has the key gets in" in told and found.certificate.fingerprint in told
     assert all(f"{url}#key=abcd-efgh" in told for url in found.urls(8765))
     assert "\n".join(qr_code("https://avatar.example.org:8765/#key=abcd-efgh")) in told
 
@@ -79,7 +79,7 @@ def test_the_operator_is_told_who_can_reach_the_server():
     assert alone.startswith("Only this machine reaches it; --host") and "--proxy" not in alone
     assert told("127.0.0.1", key="").startswith("Only this machine reaches it; who has the key")
     tunnel = told("127.0.0.1", ["avatar.example.org"], "abcd-efgh")
-    assert "tunnel lets through as avatar.example.org; who has the key can talk" in tunnel
+    assert "tunnel lets through as avatar.example.org; who has the key gets in" in tunnel
     assert "the key is abcd-efgh" in tunnel and "limits per address do not hold" in tunnel
     proxied = told("127.0.0.1", ["avatar.example.org"], "", proxies=["127.0.0.1"])
     assert "the key is" not in proxied and "limits" not in proxied
@@ -87,7 +87,7 @@ def test_the_operator_is_told_who_can_reach_the_server():
     assert "everybody can talk: no key is asked for" in everybody
     assert "can only type" in everybody and "fingerprint" not in everybody
     behind = told("0.0.0.0", key="", proxies=["172.18.0.0/16"])
-    assert "who has the key can talk" in behind and "can only type" not in behind
+    assert "who has the key gets in" in behind and "can only type" not in behind
 
 
 def test_a_key_does_not_travel_unencrypted():

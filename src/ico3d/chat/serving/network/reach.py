@@ -22,7 +22,7 @@ from ico3d.chat.serving.network.certificates import (
 from ico3d.errors import SettingsError
 
 HOST_NAME = re.compile(r"(?!-)[a-z0-9-]{1,63}(?<!-)(\.(?!-)[a-z0-9-]{1,63}(?<!-))*")
-ADMITTED = "who has the key can talk"
+ADMITTED = "who has the key gets in"
 QUIET_ZONE = 2  # modules around a QR code
 
 

@@ -1,0 +1,302 @@
+"""The application behind the studio page: recordings, guidance, the making of avatars."""
+
+import asyncio
+import contextlib
+import json
+from collections import defaultdict
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
+
+from ico3d.chat.serving.guard import Guard
+from ico3d.chat.serving.server import add_page
+from ico3d.chat.serving.sites import Sites, add_tokens
+from ico3d.common.files import FULL
+from ico3d.common.typed import plain
+from ico3d.creating.settings import QUALITIES
+from ico3d.errors import Ico3dError
+from ico3d.recording.guiding.coverage import covered
+from ico3d.recording.guiding.seeing import Eye, turn_of
+from ico3d.recording.keeping.people import People
+from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.plan import CONSENT, part_ids, scripts
+from ico3d.recording.making.makers import Makers
+from ico3d.recording.making.places import Places
+from ico3d.recording.making.progress import FACE
+from ico3d.recording.making.talks import Talks
+from ico3d.recording.refusals import Refused, full_disk
+
+ROOT = "/recordings/"
+LARGEST_CHUNK, LARGEST_PICTURE, LARGEST_FORM = 8 << 20, 1 << 20, 4096
+"""Bytes of a request: a chunk of a part, a picture for guidance, a form."""
+TYPES = {".webm": "video/webm", ".mp4": "video/mp4", ".avi": "video/x-msvideo"}
+NEVER_KEPT = {"Cache-Control": "no-store"}
+
+
+@dataclass(frozen=True)
+class Room:
+    """What the routes share.
+
+    Attributes:
+        people: The recordings.
+        eye: The face tracker.
+        makers: Processes that make avatars.
+        talks: Servers of finished avatars.
+        locks: One for each person, so that nothing is written while something is deleted.
+    """
+
+    people: People
+    eye: Eye
+    makers: Makers
+    talks: Talks
+    locks: defaultdict[str, asyncio.Lock]
+
+    def lock(self, name: str) -> asyncio.Lock:
+        """What whoever writes or deletes files of a person has to hold.
+
+        Raises:
+            Refused: If there is nobody of this name.
+        """
+        return self.locks[self.people.person(name).name]
+
+
+def make_app(room: Room, host: str, sites: Sites, names: tuple[str, ...] = ()) -> Guard:
+    """The application of the server.
+
+    Args:
+        room: What it serves.
+        host: Address to which it is bound.
+        sites: Says whether a key is asked for.
+        names: Further host names of the server.
+    """
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        await asyncio.to_thread(room.makers.go_on)
+        yield
+        await asyncio.to_thread(room.makers.close)
+        await asyncio.to_thread(room.talks.close)
+        room.eye.close()
+
+    app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+    app.add_exception_handler(Ico3dError, _refuse)
+    app.add_exception_handler(OSError, _refuse)
+    _add_people(app, room)
+    _add_parts(app, room)
+    _add_making(app, room)
+    add_tokens(app, sites)
+
+    @app.get("/")
+    async def first(request: Request) -> Response:
+        query = f"?{request.url.query}" if request.url.query else ""
+        return RedirectResponse(f"studio{query}")
+
+    add_page(app)
+    return Guard(app, host, sites, names, camera=True)
+
+
+async def _refuse(request: Request, error: Exception) -> Response:
+    """An error as one sentence."""
+    del request
+    if isinstance(error, OSError):
+        if error.errno not in FULL:
+            raise error
+        error = full_disk()
+    code, status = (error.code, error.status) if isinstance(error, Refused) else ("", 500)
+    return JSONResponse({"code": code, "error": str(error)}, status, NEVER_KEPT)
+
+
+def _add_people(app: FastAPI, room: Room) -> None:
+    """Whose recordings there are; a new one; everything of one gone."""
+
+    @app.get(ROOT)
+    async def overview() -> Response:
+        shown = {
+            "people": await asyncio.to_thread(room.people.names),
+            "consent": {language: one.consent for language, one in scripts().items()},
+            "qualities": list(QUALITIES),
+            "lacking": room.eye.lacking,
+        }
+        return JSONResponse(shown, headers=NEVER_KEPT)
+
+    @app.post(ROOT + "{name}")
+    async def begin(name: str, request: Request) -> Response:
+        form = await _form(request)
+        agreed = form.get("agreed") is True
+        about = (name, str(form.get("language")), agreed, date.today())
+        person = await asyncio.to_thread(room.people.begin, *about)
+        return JSONResponse(await asyncio.to_thread(_status, room, person), 201)
+
+    @app.get(ROOT + "{name}")
+    async def status(name: str) -> Response:
+        person = room.people.person(name)
+        shown = await asyncio.to_thread(_status, room, person)
+        return JSONResponse(shown, headers=NEVER_KEPT)
+
+    @app.delete(ROOT + "{name}")
+    async def delete(name: str) -> Response:
+        person = room.people.person(name)
+        async with room.lock(name):
+            await asyncio.to_thread(room.makers.stop, person)
+            await asyncio.to_thread(room.talks.stop, person.name)
+            await asyncio.to_thread(room.people.delete, person.name)
+        return Response(status_code=204)
+
+
+def _add_parts(app: FastAPI, room: Room) -> None:
+    """The parts of a recording, as they are recorded, kept, seen, and removed."""
+    takes, part = ROOT + "{name}/takes/{id}/{take}", ROOT + "{name}/parts/{id}"
+
+    @app.post(takes)
+    async def append(name: str, id: str, take: str, offset: int, request: Request) -> Response:
+        data = await _body(request, LARGEST_CHUNK)
+        async with room.lock(name):
+            person = room.people.person(name)
+            if id != CONSENT:
+                person.check_spoken()
+            room.people.check_room()
+            size = await asyncio.to_thread(person.append, id, take, offset, data)
+        return JSONResponse({"size": size})
+
+    @app.post(takes + "/keep")
+    async def keep(name: str, id: str, take: str) -> Response:
+        person = room.people.person(name)
+        file = person.unfinished(id, take)
+        try:
+            report = await asyncio.to_thread(room.eye.report, file, id)
+        except Refused as error:
+            if error.code == "no-video":
+                person.discard(id, take)
+            raise
+        async with room.lock(name):
+            room.people.person(name)  # may be deleted by now
+            await asyncio.to_thread(person.keep, id, take, report)
+        return JSONResponse(await asyncio.to_thread(_status, room, person))
+
+    @app.get(part)
+    async def play(name: str, id: str) -> Response:
+        found = room.people.person(name).part(id)
+        if found is None:
+            raise Refused("part", "this part is not recorded.", 404)
+        kind = TYPES.get(found.file.suffix, "video/webm")
+        return FileResponse(found.file, media_type=kind, headers=NEVER_KEPT)
+
+    @app.delete(part)
+    async def remove(name: str, id: str) -> Response:
+        async with room.lock(name):
+            person = room.people.person(name)
+            await asyncio.to_thread(person.remove, id)
+        return JSONResponse(await asyncio.to_thread(_status, room, person))
+
+    @app.post(ROOT + "{name}/look")
+    async def look(name: str, request: Request, part: str = "") -> Response:
+        room.people.person(name)
+        picture = await _body(request, LARGEST_PICTURE)
+        told = await asyncio.to_thread(room.eye.told, picture, turn_of(part))
+        return JSONResponse(plain(told))
+
+
+def _add_making(app: FastAPI, room: Room) -> None:
+    """The making of an avatar, its progress, and the talk at its end."""
+    making = ROOT + "{name}/making"
+
+    @app.post(making)
+    async def make(name: str, request: Request) -> Response:
+        quality = str((await _form(request)).get("quality"))
+        person = room.people.person(name)
+        async with room.lock(name):
+            await asyncio.to_thread(room.talks.stop, person.name)
+            await asyncio.to_thread(room.makers.begin, person, quality)
+        return JSONResponse(await asyncio.to_thread(_status, room, person))
+
+    @app.delete(making)
+    async def stop(name: str) -> Response:
+        person = room.people.person(name)
+        await asyncio.to_thread(room.makers.stop, person)
+        return JSONResponse(await asyncio.to_thread(_status, room, person))
+
+    @app.get(making + "/face")
+    async def face(name: str) -> Response:
+        file = Places(room.people.person(name).folder).folder / FACE
+        if not file.is_file():
+            raise Refused("part", "there is no picture yet.", 404)
+        return FileResponse(file, media_type="image/jpeg", headers=NEVER_KEPT)
+
+    @app.post(ROOT + "{name}/talk")
+    async def talk(name: str) -> Response:
+        avatar = Places(room.people.person(name).folder).avatar
+        return JSONResponse({"url": await asyncio.to_thread(room.talks.url, avatar)})
+
+
+def _status(room: Room, person: Person) -> dict[str, Any]:
+    """All that the page shows of a person."""
+    about = person.consent()
+    language = about["language"]
+    script, found = scripts()[language], {part.id: part for part in person.parts()}
+    texts = {f"text-{n}": one.text for n, one in enumerate(script.texts, 1)}
+    texts["consent"] = script.consent.format(name=person.name)
+    parts = [
+        {"id": id, "text": texts.get(id, script.aloud)} | _of_part(found.get(id))
+        for id in (*part_ids(language), "upload")
+    ]
+    return {
+        "name": person.name,
+        "language": language,
+        "parts": parts,
+        "covered": plain(covered(found.values(), language)),
+        "making": plain(room.makers.progress(person)),
+        "avatar": Places(person.folder).avatar.is_file(),
+    }
+
+
+def _of_part(part: Any) -> dict[str, Any]:
+    """What the page shows of a part."""
+    if part is None:
+        return {"state": "missing"}
+    if part.report is None:
+        return {"state": "broken", "take": part.take}
+    return {"state": "kept"} | part.report
+
+
+async def _body(request: Request, most: int) -> bytes:
+    """The body of a request.
+
+    Raises:
+        Refused: If it is larger than `most` bytes.
+    """
+    data = bytearray()
+    async for piece in request.stream():
+        data += piece
+        if len(data) > most:
+            raise Refused("large", "this is more than is taken at once.", 413)
+    return bytes(data)
+
+
+async def _form(request: Request) -> dict[str, Any]:
+    """The JSON object of a request; empty where there is none.
+
+    Raises:
+        Refused: If it is large.
+    """
+    try:
+        form = json.loads(await _body(request, LARGEST_FORM))
+    except ValueError:
+        return {}
+    return form if isinstance(form, dict) else {}
+
+
+def open_room(folder: Path, host: str, tls: bool) -> Room:
+    """What a server of the studio page shares.
+
+    Args:
+        folder: Where the recordings are.
+        host: Address to which it is bound.
+        tls: Whether it serves by HTTPS.
+    """
+    people = People(folder)
+    return Room(people, Eye(), Makers(people), Talks(host, tls), defaultdict(asyncio.Lock))

@@ -1,0 +1,76 @@
+"""The verb `ico3d studio`."""
+
+import sys
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Studio:
+    """Opens a page on which somebody records themselves and gets their avatar.
+
+    Everything that is recorded and made lies below the folder, and the page deletes it, too.
+
+    Attributes:
+        folder: Where recordings and avatars are, a folder for each person.
+        host: Address to listen on; with 127.0.0.1 other machines cannot reach the page.
+        port: Port to listen on; 0 takes any free port.
+        tls: Serve by HTTPS, as browsers demand before they give the camera to another machine's
+            page, with a certificate that this machine makes, keeps and renews.
+        browser: Open the page in a browser.
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional] = Path("recordings")
+    host: str = "127.0.0.1"
+    port: int = 8766
+    tls: bool = False
+    browser: bool = True
+
+    def run(self) -> None:
+        """Serves until interrupted.
+
+        Raises:
+            SettingsError: If others could come without HTTPS, the port is taken, or the folder
+                cannot be made.
+        """
+        from ico3d.chat.observing.operator_log import set_up_log
+        from ico3d.chat.serving import server
+        from ico3d.chat.serving.guard import LOOPBACK
+        from ico3d.chat.serving.network.reach import find_reach, fragment
+        from ico3d.chat.serving.sites import open_sites, shown_key
+        from ico3d.chat.settings.embedding import Embedding
+        from ico3d.errors import SettingsError
+        from ico3d.recording.app import make_app, open_room
+
+        set_up_log(verbose=False)
+        if self.host not in LOOPBACK and not self.tls:
+            raise SettingsError(
+                f"--host {self.host}: browsers give their camera only to HTTPS pages, and the key "
+                "must not travel unencrypted. Add --tls."
+            )
+        reach = find_reach(self.host, (), self.tls, None, None)
+        key = shown_key(reach.is_public, False, Embedding())
+        sites = open_sites(Embedding(), key or "")
+        listener = server.bind(self.host, self.port)
+        try:
+            room = open_room(self.folder.absolute(), self.host, self.tls)
+        except OSError as error:
+            raise SettingsError(f"{self.folder} cannot be written ({error.strerror}).") from error
+        app = make_app(room, self.host, sites, reach.answered)
+        url = server.address(listener, reach.scheme)
+        listener.listen()
+        print(f"The studio is at {url}{fragment(key)} (Ctrl+C ends)")
+        print("\n".join(reach.told(listener.getsockname()[1], key)))
+        print(f"Recordings and avatars are in {self.folder}")
+        if room.eye.lacking:
+            print(f"Without guidance by the face: {room.eye.lacking}", file=sys.stderr)
+        if not (server.STATIC / "studio.html").is_file():
+            print("The page is not built: run `make viewer`.", file=sys.stderr)
+        sys.stdout.flush()
+        if self.browser:
+            webbrowser.open(f"{url}{fragment(key)}")
+        server.make_server(app, reach.certificate).run(sockets=[listener])

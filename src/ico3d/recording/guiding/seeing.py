@@ -1,0 +1,186 @@
+"""Looks at pictures and parts with the face tracker, or, where it is missing, at their light."""
+
+import io
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from ico3d.capture.face.mediapipe_face import FaceReader
+from ico3d.capture.video import open_video, read_sound
+from ico3d.common.weights import model_file
+from ico3d.creating.looking.advice import Advice
+from ico3d.creating.looking.picture_checks import picture_advice
+from ico3d.creating.looking.samples import Samples, sample_of, sharpness_of
+from ico3d.creating.looking.sound_checks import sound_advice
+from ico3d.errors import CaptureError, Ico3dError, MissingExtraError, MissingModelError
+from ico3d.recording.guiding.guide import GOALS, Told, extremes, instruct, without_faces
+from ico3d.recording.keeping.plan import CONSENT, TURNS, UPLOAD, Turn
+from ico3d.recording.refusals import Refused, no_video
+
+SIDE = 512
+"""Upper limit of the short side of parts that are looked at, in pixels, as `ico3d create` has."""
+MOST_SIDE = 2000
+"""Largest side of a picture that a page may send."""
+MOST_PIXELS = 8192 * 4320
+"""Largest size of a video's pictures: what cameras record at most."""
+RATE = 3.0
+"""Pictures per second of a part that are looked at."""
+MIDDLE = 0.3
+"""Share of a picture at each edge that is left out where nobody knows where the face is."""
+OF_A_WHOLE = ("turns", "length", "lips", "exposure", "camera")
+"""Advice that only a whole recording can follow."""
+
+
+class Eye:
+    """The tracker of faces, shared by all who record; one picture at a time."""
+
+    def __init__(self):
+        """Loads the tracker; without one, `lacking` says how to get it."""
+        self._lock = threading.Lock()
+        self._faces: FaceReader | None = None
+        self.lacking = ""
+        try:
+            self._faces = FaceReader(model_file("face_landmarker.task", "guidance by the face"), 2)
+        except (MissingModelError, MissingExtraError) as error:
+            self.lacking = str(error)
+
+    def close(self) -> None:
+        """Frees the tracker."""
+        with self._lock:
+            if self._faces is not None:
+                self._faces.__exit__()
+            self._faces = None
+
+    def told(self, jpeg: bytes, wanted: Turn | None) -> Told:
+        """What to tell somebody who is seen in a picture.
+
+        Args:
+            jpeg: The picture.
+            wanted: Way to turn the head, if that is what is being recorded.
+
+        Raises:
+            Refused: If it is no picture, or a large one.
+        """
+        picture = _decoded(jpeg)
+        with self._lock:
+            if self._faces is None:
+                return without_faces(*_middle(picture))
+            sample = sample_of(0.0, picture, self._faces, None)
+        return instruct(sample, min(picture.shape[:2]), wanted)
+
+    def report(self, file: Path, id: str) -> dict[str, Any]:
+        """What is found in a part: its seconds, the turns of the head, advice.
+
+        Args:
+            file: The recording.
+            id: The part.
+
+        Returns:
+            `seconds`; `turn`, degrees (least to the left, most, least up, most), None where no face
+            was looked for or found; `advice`, sentences.
+
+        Raises:
+            Refused: If it is no video, or a consent in which nothing is heard.
+        """
+        from av.error import FFmpegError
+
+        try:
+            return _of_consent(file) if id == CONSENT else self._found(file, id)
+        except Refused:
+            raise
+        except (Ico3dError, FFmpegError, OSError, ValueError) as error:
+            raise no_video() from error
+
+    def _found(self, file: Path, id: str) -> dict[str, Any]:
+        _check_size(file)
+        video = open_video(file, SIDE)
+        heard = sound_advice(read_sound(file))
+        seen: list[Advice] = []
+        turn = None
+        if self._faces is None:
+            for _ in video.frames(RATE):
+                pass
+        else:
+            samples = self._samples(video)
+            seen = list(picture_advice(samples))
+            turns = np.array([sample.turn for sample in samples.with_face])  # (S, 2)
+            if len(turns):
+                low, high = turns.min(0), turns.max(0)
+                turn = [round(float(v), 1) for v in (low[0], high[0], low[1], high[1])]
+        if video.decoded < 2:
+            raise CaptureError(f"{file} is a picture.")
+        left_out = () if id == UPLOAD else OF_A_WHOLE
+        said = [str(one) for one in (*seen, *heard) if one.topic not in left_out]
+        said += short_of(id, turn)
+        return {"seconds": round(video.times[-1], 2), "turn": turn, "advice": said}
+
+    def _samples(self, video: Any) -> Samples:
+        found = []
+        for number, picture in enumerate(video.frames(RATE)):
+            with self._lock:  # between two pictures others are looked at
+                if self._faces is None:
+                    break
+                found.append(sample_of(number / RATE, picture, self._faces, None))
+        return Samples(tuple(found), 1 / RATE, min(video.width, video.height), False)
+
+
+def turn_of(text: str) -> Turn | None:
+    """The way to turn the head in a part; None for one in which the person looks ahead."""
+    return next((turn for turn in TURNS if turn == text), None)
+
+
+def _check_size(file: Path) -> None:
+    """Refuses a video whose pictures would fill the memory, before one is decoded.
+
+    Raises:
+        Refused: If its file states more pixels than `MOST_PIXELS`.
+    """
+    import av
+
+    with av.open(str(file), metadata_errors="replace") as container:
+        sizes = [stream.width * stream.height for stream in container.streams.video]
+    if max(sizes, default=0) > MOST_PIXELS:
+        raise Refused("large", "the pictures of this video are larger than is taken.", 413)
+
+
+def short_of(id: str, turn: list[float] | None) -> list[str]:
+    """What is said of a turn of the head that did not go far enough; nothing of any other part."""
+    way = turn_of(id)
+    if way is None or turn is None or (share := extremes(turn)[way]) >= 1:
+        return []
+    goal = GOALS[way]
+    where = {"left": "to the left", "right": "to the right", "up": "up", "down": "down"}[way]
+    return [f"the head was turned {where} by {share * goal:.0f}°: {goal:.0f}° shows enough of it."]
+
+
+def _of_consent(file: Path) -> dict[str, Any]:
+    """What is found in a spoken consent, which may be without pictures."""
+    sound = read_sound(file)
+    if sound is None or any(one.level == "refused" for one in sound_advice(sound)):
+        raise Refused("unheard", "nothing is heard: switch the microphone on, say it again.", 422)
+    return {"seconds": round(len(sound.samples) / sound.rate, 2), "turn": None, "advice": []}
+
+
+def _decoded(jpeg: bytes) -> np.ndarray:
+    """(H, W, 3) uint8 RGB."""
+    try:
+        with Image.open(io.BytesIO(jpeg), formats=["JPEG"]) as image:
+            if max(image.size) > MOST_SIDE or min(image.size) < 32:
+                raise Refused("picture", "the picture has an unusual size.", 422)
+            return np.asarray(image.convert("RGB"))
+    except (UnidentifiedImageError, OSError, ValueError) as error:
+        raise Refused("picture", "this is no JPEG picture.", 415) from error
+
+
+def _middle(picture: np.ndarray) -> tuple[float, float | None]:
+    """Brightness, 0 to 1, and sharpness of the middle of a picture; None without OpenCV."""
+    height, width = picture.shape[:2]
+    y, x = round(MIDDLE * height), round(MIDDLE * width)
+    grey = picture[y : height - y, x : width - x].mean(-1).astype(np.float32) / 255
+    try:
+        return float(grey.mean()), sharpness_of(grey)
+    except ImportError:
+        return float(grey.mean()), None

@@ -1,0 +1,1 @@
+"""What is recorded of people: their consent and their parts, as plain files."""

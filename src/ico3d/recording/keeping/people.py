@@ -1,0 +1,110 @@
+"""The folder of all recordings: whose there are, and how one begins."""
+
+import json
+import re
+import shutil
+import unicodedata
+from datetime import date
+from pathlib import Path
+
+from ico3d.avatar.forgetting.removal import remove
+from ico3d.bundle.people.provenance import Provenance, provenance_to_json
+from ico3d.common.files import write_atomic
+from ico3d.creating.settings import OWN_USE
+from ico3d.recording.keeping.person import CONSENT_FILE, Person
+from ico3d.recording.keeping.plan import scripts
+from ico3d.recording.refusals import Refused, bad_name, full_disk
+
+NAME = re.compile(r"[^\W\d_][\w -]{0,39}")
+"""What may be the name of a person, and so of a folder and a file."""
+MOST = 100
+"""Number of people whose recordings one folder holds."""
+SPARE = 200_000_000
+"""Bytes that stay free on the disk."""
+
+
+class People:
+    """What was recorded of people, a folder for each."""
+
+    def __init__(self, folder: Path):
+        """Keeps them below `folder`, which is made where it is missing."""
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def names(self) -> list[str]:
+        """Whose recordings there are, sorted."""
+        found = (file.parent.name for file in self.folder.glob(f"*/{CONSENT_FILE}"))
+        return sorted(name for name in found if NAME.fullmatch(name))
+
+    def person(self, name: str) -> Person:
+        """Somebody who agreed.
+
+        Raises:
+            Refused: If there is nobody of this name.
+        """
+        folder = self.folder / checked_name(name)
+        if not (folder / CONSENT_FILE).is_file() or folder.is_symlink():
+            raise Refused("unknown", f"nothing is recorded of {name[:40]}.", 404)
+        return Person(folder)
+
+    def begin(self, name: str, language: str, agreed: bool, today: date) -> Person:
+        """Begins a recording with what the person agreed to.
+
+        Args:
+            name: The person's name.
+            language: Language in which they agree and read.
+            agreed: Whether they ticked the sentence.
+            today: The day.
+
+        Raises:
+            Refused: If the name is none or taken, if they did not agree, or there is no room.
+        """
+        name = checked_name(name)
+        script = scripts().get(language)
+        if script is None:
+            raise Refused("language", f"there are no texts in the language {language[:10]!r}.")
+        if not agreed:
+            raise Refused("consent", "nothing is recorded of anybody who did not agree.", 403)
+        if (self.folder / name).exists():
+            raise Refused("taken", f"there are recordings of {name} already.", 409)
+        if len(self.names()) >= MOST:
+            raise Refused("many", "there are recordings of 100 people: delete some of them.", 409)
+        self.check_room()
+        said = f"“{script.consent.format(name=name)}”"
+        about = Provenance(
+            "portrait", (), f"agreed on {today.isoformat()}, ticked: {said}", OWN_USE, name, name
+        )
+        stated = provenance_to_json(about) | {"language": language}
+        text = json.dumps(stated, indent=1, ensure_ascii=False)
+        write_atomic(self.folder / name / CONSENT_FILE, text.encode())
+        return Person(self.folder / name)
+
+    def check_room(self) -> None:
+        """Refuses to write where the disk is nearly full.
+
+        Raises:
+            Refused: If it is.
+        """
+        if shutil.disk_usage(self.folder).free < SPARE:
+            raise full_disk()
+
+    def delete(self, name: str) -> None:
+        """Removes everything of a person: consent, recordings, what was made of them.
+
+        Raises:
+            Refused: If there is nobody of this name.
+            SettingsError: If something cannot be removed; the sentence names it.
+        """
+        remove([self.person(name).folder])
+
+
+def checked_name(name: str) -> str:
+    """A name as it is kept.
+
+    Raises:
+        Refused: If it is none.
+    """
+    name = unicodedata.normalize("NFC", name).strip()
+    if not NAME.fullmatch(name):
+        raise bad_name()
+    return name

@@ -1,0 +1,201 @@
+"""What is recorded of one person: parts that grow while they are recorded, and the kept ones."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ico3d.common.files import write_atomic
+from ico3d.recording.keeping.containers import HEAD, suffix_of
+from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD
+from ico3d.recording.refusals import Refused, no_video
+
+CONSENT_FILE = "consent.json"
+PARTS = "parts"
+UNFINISHED = ".part"
+MOST_BYTES, MOST_UPLOADED = 256 << 20, 2 << 30
+"""Largest size of a recorded part, and of a video that is brought."""
+MOST_TAKES = 4
+"""Unfinished takes of one part that are kept; older ones make room."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part as it lies on the disk.
+
+    Attributes:
+        id: Its name.
+        file: The recording.
+        take: Name of the take, where its recording broke off and it was not kept yet; else empty.
+        report: What was found in it; None where it was not kept yet.
+    """
+
+    id: str
+    file: Path
+    take: str
+    report: dict[str, Any] | None
+
+
+class Person:
+    """The files of one person."""
+
+    def __init__(self, folder: Path):
+        """Takes the person's folder, which holds their consent."""
+        self.folder = folder
+        self._parts = folder / PARTS
+
+    @property
+    def name(self) -> str:
+        """The person's name."""
+        return self.folder.name
+
+    def consent(self) -> dict[str, Any]:
+        """What the person agreed to, as bundles state it, with the language of the texts.
+
+        Raises:
+            Refused: If the file is damaged.
+        """
+        try:
+            return json.loads((self.folder / CONSENT_FILE).read_text("utf-8"))
+        except (OSError, ValueError) as error:
+            raise Refused("unknown", f"the consent of {self.name} cannot be read.", 404) from error
+
+    def check_spoken(self) -> None:
+        """Refuses to go on before the person said aloud that they agree.
+
+        Raises:
+            Refused: If that part was not recorded.
+        """
+        if self._kept(CONSENT) is None:
+            raise Refused("unspoken", "say first that you agree: record that part.", 409)
+
+    def parts(self) -> Iterator[Part]:
+        """All parts, kept ones and those whose recording broke off."""
+        for id in sorted(ALL_IDS):
+            kept = self._kept(id)
+            if kept is not None:
+                yield Part(id, kept, "", self._report(id))
+            elif takes := self._takes(id):
+                largest = max(takes, key=lambda file: file.stat().st_size)
+                yield Part(id, largest, largest.name.split(".")[1], None)
+
+    def part(self, id: str) -> Part | None:
+        """One part; None where nothing of it was recorded."""
+        return next((one for one in self.parts() if one.id == checked_id(id)), None)
+
+    def append(self, id: str, take: str, offset: int, data: bytes) -> int:
+        """Adds bytes to a take; those that it has already are taken as repeated.
+
+        Args:
+            id: The part.
+            take: Name of the take: letters and digits, chosen by the page.
+            offset: Number of bytes before these.
+            data: The bytes.
+
+        Returns:
+            Size of the take in bytes.
+
+        Raises:
+            Refused: If they do not follow what is there, are too many, or no video begins so.
+            OSError: If they cannot be written.
+        """
+        file = self._take(id, take)
+        size = file.stat().st_size if file.is_file() else 0
+        if offset + len(data) > (MOST_UPLOADED if id == UPLOAD else MOST_BYTES):
+            raise Refused("large", "this is longer than is recorded: stop, and begin anew.", 413)
+        if offset + len(data) <= size:
+            return size
+        if offset != size:
+            raise Refused("gap", f"{size} bytes of this part are there: go on from these.", 409)
+        if offset == 0:
+            if not suffix_of(data[:HEAD]):
+                raise no_video()
+            self._make_room(id)
+        self._parts.mkdir(exist_ok=True)
+        with file.open("ab") as stream:
+            try:
+                stream.write(data)
+                stream.flush()
+            except OSError:
+                stream.truncate(size)  # what follows is to begin where the page thinks
+                raise
+        return size + len(data)
+
+    def unfinished(self, id: str, take: str) -> Path:
+        """The file of a take that is not kept yet.
+
+        Raises:
+            Refused: If there is none.
+        """
+        file = self._take(id, take)
+        if not file.is_file():
+            raise Refused("unknown", "nothing of this part has arrived: record it again.", 404)
+        return file
+
+    def keep(self, id: str, take: str, report: dict[str, Any]) -> None:
+        """Lets a take be the part, in the place of an earlier one."""
+        file, before = self.unfinished(id, take), self._kept(id)
+        with file.open("rb") as stream:
+            suffix = suffix_of(stream.read(HEAD))
+        kept = self._parts / f"{id}{suffix}"
+        self._parts.joinpath(f"{id}.json").unlink(missing_ok=True)  # what was said of the other one
+        file.replace(kept)
+        write_atomic(self._parts / f"{id}.json", json.dumps(report, indent=1).encode())
+        if before is not None and before != kept:
+            before.unlink()
+        for other in self._takes(id):
+            other.unlink()
+        if id == CONSENT:
+            self._state_spoken()
+
+    def discard(self, id: str, take: str) -> None:
+        """Removes a take that shows nothing."""
+        self._take(id, take).unlink(missing_ok=True)
+
+    def remove(self, id: str) -> None:
+        """Removes a part, its takes and what was found in it."""
+        for file in self._parts.glob(f"{checked_id(id)}.*"):
+            file.unlink()
+
+    def _state_spoken(self) -> None:
+        """Adds to the consent that it was spoken, too."""
+        about = self.consent()
+        about["consent"] = about["consent"].replace(", ticked: ", ", ticked and spoken: ")
+        text = json.dumps(about, indent=1, ensure_ascii=False)
+        write_atomic(self.folder / CONSENT_FILE, text.encode())
+
+    def _take(self, id: str, take: str) -> Path:
+        if not (take.isascii() and take.isalnum() and len(take) <= 32):
+            raise Refused("part", "a take has a name of letters and digits.", 404)
+        return self._parts / f"{checked_id(id)}.{take}{UNFINISHED}"
+
+    def _takes(self, id: str) -> list[Path]:
+        """Unfinished takes of a part, the oldest first."""
+        found = self._parts.glob(f"{id}.*{UNFINISHED}")
+        return sorted(found, key=lambda file: file.stat().st_mtime)
+
+    def _kept(self, id: str) -> Path | None:
+        files = self._parts.glob(f"{id}.*")
+        return next((f for f in files if f.suffix not in (UNFINISHED, ".json")), None)
+
+    def _make_room(self, id: str) -> None:
+        for old in self._takes(id)[: -(MOST_TAKES - 1)]:
+            old.unlink()
+
+    def _report(self, id: str) -> dict[str, Any]:
+        try:
+            return json.loads((self._parts / f"{id}.json").read_text("utf-8"))
+        except (OSError, ValueError):
+            return {"seconds": 0.0, "turn": None, "advice": []}
+
+
+def checked_id(id: str) -> str:
+    """The name of a part.
+
+    Raises:
+        Refused: If there is no such part.
+    """
+    if id not in ALL_IDS:
+        raise Refused("part", "there is no such part of a recording.", 404)
+    return id

@@ -1,0 +1,60 @@
+"""Processes beside the server that end with it.
+
+They are started with a pipe as standard input; when the server ends, even if it is killed, the pipe
+closes, and they end.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from typing import IO
+
+PATIENCE = 5.0
+"""Seconds in which a process may end by itself before it is killed."""
+
+
+def end_with_parent() -> None:
+    """Ends this process, and those that it started, when its standard input closes."""
+
+    def wait() -> None:
+        sys.stdin.buffer.read()
+        os.killpg(0, signal.SIGKILL)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def start(module: str, words: Sequence[str], out: IO[bytes] | int) -> subprocess.Popen[bytes]:
+    """Starts a module of ico3d in a process group of its own.
+
+    Args:
+        module: Its name.
+        words: Its arguments.
+        out: What takes its output and its errors.
+    """
+    return subprocess.Popen(
+        [sys.executable, "-m", module, *words],
+        stdin=subprocess.PIPE,
+        stdout=out,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """Ends a process and all that it started; returns when it is gone."""
+    if process.poll() is None:
+        try:
+            os.killpg(process.pid, signal.SIGTERM)
+            process.wait(PATIENCE)
+        except (ProcessLookupError, subprocess.TimeoutExpired):
+            process.kill()
+        process.wait()
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            stream.close()

@@ -1,0 +1,70 @@
+"""Starts and stops the servers of finished avatars."""
+
+import re
+import subprocess
+import threading
+from collections.abc import Iterable
+from pathlib import Path
+
+from ico3d.recording.making.beside import start, stop
+from ico3d.recording.refusals import Refused
+
+TALK = "ico3d.recording.making.talk"
+
+
+class Talks:
+    """Servers of finished avatars, as `ico3d serve` starts them, one for each."""
+
+    def __init__(self, host: str, tls: bool):
+        """Serves on the address `host`, by HTTPS if wanted."""
+        self._words = [host, "tls" if tls else "plain"]
+        self._running: dict[str, tuple[subprocess.Popen[bytes], str]] = {}
+        self._lock = threading.Lock()
+
+    def url(self, avatar: Path) -> str:
+        """Address of the page on which an avatar talks; its server is started where there is none.
+
+        Raises:
+            Refused: If the avatar is not made, or cannot be served.
+        """
+        if not avatar.is_file():
+            raise Refused("unmade", "the avatar is not made yet.", 409)
+        with self._lock:
+            process, url = self._running.get(avatar.stem, (None, ""))
+            if process is not None and process.poll() is None:
+                return url
+            process = start(TALK, [str(avatar), *self._words], subprocess.PIPE)
+            self._running[avatar.stem] = process, (url := _read_url(process))
+            if not url:
+                stop(process)
+                raise Refused("silent", f"the avatar cannot talk: ico3d serve {avatar.name}.", 500)
+            return url
+
+    def stop(self, name: str) -> None:
+        """Ends the server of somebody's avatar, if there is one."""
+        with self._lock:
+            process, _ = self._running.pop(name, (None, ""))
+            if process is not None:
+                stop(process)
+
+    def close(self) -> None:
+        """Ends all servers."""
+        for name in list(self._running):
+            self.stop(name)
+
+
+def _read_url(process: subprocess.Popen[bytes]) -> str:
+    """The address that a server prints; empty if it ends without one."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        found = re.search(rb"https?://\S+", line)
+        if found:
+            threading.Thread(target=_drain, args=(process.stdout,), daemon=True).start()
+            return found[0].decode()
+    return ""
+
+
+def _drain(printed: Iterable[bytes]) -> None:
+    """Reads what is printed to its end: a full pipe would stop the server."""
+    for _ in printed:
+        pass

@@ -1,0 +1,107 @@
+"""The process in which an avatar is made: `python -m ico3d.recording.making.worker FOLDER QUALITY`.
+
+It ends with the process that started it, and whoever starts it again goes on where it was.
+"""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+from typing import cast
+
+from ico3d.common.files import write_atomic
+from ico3d.creating.create import create
+from ico3d.creating.settings import CreateSettings, QualityName
+from ico3d.errors import CaptureError, Ico3dError
+from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
+from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.making.joining import join
+from ico3d.recording.making.places import Places
+from ico3d.recording.making.progress import Reporter, begun
+
+
+def make(person: Person, quality: QualityName) -> Path:
+    """Makes the avatar of a person, or goes on with it; the progress tells of it and of its end.
+
+    Args:
+        person: Whose it is.
+        quality: How well it is to be made.
+
+    Returns:
+        The avatar.
+
+    Raises:
+        Ico3dError: As for `create`, and if there is no recording.
+    """
+    places, about = Places(person.folder), person.consent()
+    tell = Reporter(places.folder, begun(places.folder, quality))
+    tell.change()
+    try:
+        video = _video(person, places)
+        settings = CreateSettings(
+            video,
+            places.made,
+            quality,
+            consent=about["consent"],
+            licence=about["licence"],
+            made_by=about["made_by"],
+        )
+        create(settings, tell)
+        write_atomic(places.avatar, lambda file: _copy(places.made, file))
+    except Ico3dError as error:
+        tell.change(state="failed", error=_short(str(error), person.folder))
+        raise
+    tell.change(state="made")
+    return places.avatar
+
+
+def _short(sentence: str, folder: Path) -> str:
+    """A sentence without the names of files that the person does not know."""
+    return re.sub(rf"{re.escape(str(folder))}/(\S+: )?", "", sentence)
+
+
+def _video(person: Person, places: Places) -> Path:
+    """The video that was brought, or the parts as one; what was made of another one is cleared."""
+    parts = {part.id: part.file for part in person.parts() if part.report is not None}
+    ids = [UPLOAD] if UPLOAD in parts else part_ids(person.consent()["language"])
+    files = [parts[id] for id in ids if id in parts and id != CONSENT]
+    if not files:
+        raise CaptureError("there is no recording: record some parts, or choose a video.")
+    now = [[file.name, file.stat().st_size, file.stat().st_mtime] for file in files]
+    video = files[0] if UPLOAD in parts else places.joined
+    if _before(places) != now or not video.is_file():
+        shutil.rmtree(places.work, ignore_errors=True)
+        places.made.unlink(missing_ok=True)
+        if video == places.joined:
+            join(files, video)
+        write_atomic(places.joined_of, json.dumps(now).encode())
+    return video
+
+
+def _before(places: Places) -> list | None:
+    try:
+        return json.loads(places.joined_of.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _copy(file: Path, to: Path) -> None:
+    shutil.copyfile(file, to)
+
+
+def main() -> int:
+    """Makes an avatar; the exit status."""
+    end_with_parent()
+    folder, quality = sys.argv[1:]
+    try:
+        make(Person(Path(folder)), cast(QualityName, quality))
+    except Ico3dError as error:
+        print(f"ico3d: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,36 @@
+"""Why the studio page's server refuses something, as sentences that the page translates."""
+
+from ico3d.errors import Ico3dError
+
+
+class Refused(Ico3dError):
+    """A request of the studio page that is not done; what was recorded before is kept.
+
+    Attributes:
+        code: Name of the sentence; the page's own words for it are those of `studio.refused.CODE`.
+        status: Status of the HTTP answer.
+    """
+
+    def __init__(self, code: str, text: str, status: int = 400):
+        """Takes the sentence in English, for pages that have none of their own."""
+        super().__init__(text)
+        self.code, self.status = code, status
+
+
+def bad_name() -> Refused:
+    """A name that is none."""
+    return Refused(
+        "name", "a name has 1 to 40 letters, digits, spaces and hyphens, and begins with a letter."
+    )
+
+
+def full_disk() -> Refused:
+    """A disk without room."""
+    return Refused(
+        "full", "the disk is full: free some space and go on; what was recorded is kept.", 507
+    )
+
+
+def no_video() -> Refused:
+    """A file of another kind."""
+    return Refused("no-video", "this file is no video: choose an MP4, MOV, WebM or AVI.", 415)

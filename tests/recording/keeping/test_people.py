@@ -1,0 +1,94 @@
+"""Whose recordings there are: names, consent, room on the disk, and that deleting is deleting."""
+
+import json
+
+import pytest
+
+from ico3d.bundle.people.provenance import Provenance
+from ico3d.common.people.stated import is_stated
+from ico3d.recording.keeping import people as room
+from ico3d.recording.keeping.people import People
+from ico3d.recording.refusals import Refused
+from support.studio_page.parts import DAY, begun, kept
+
+WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)
+
+
+def test_consent_is_written_as_bundles_state_it(tmp_path):
+    person = begun(tmp_path)
+    stated = json.loads((tmp_path / "Ida" / "consent.json").read_text("utf-8"))
+    assert stated.pop("language") == "en"
+    about = Provenance(**(stated | {"sources": tuple(stated["sources"])}))
+    assert about.likeness == about.made_by == "Ida" and is_stated(about.consent)
+    assert about.consent.startswith("agreed on 2026-11-24, ticked: “I am Ida. I agree")
+    assert (about.kind, about.licence) == ("portrait", "for this person's own use")
+    kept(person, "consent", WEBM)
+    assert person.consent()["consent"].startswith("agreed on 2026-11-24, ticked and spoken: “I")
+    kept(person, "consent", WEBM)
+    assert person.consent()["consent"].count("spoken") == 1
+
+
+@pytest.mark.parametrize(
+    "name", ["", " ", "..", "../x", "a/b", "a\\b", ".x", "-x", "x" * 41, "x.y", "x\0", "1a", "a\nb"]
+)
+def test_names_that_lead_elsewhere_are_none(tmp_path, name):
+    people = People(tmp_path / "in")
+    for act in (lambda: people.begin(name, "en", True, DAY), lambda: people.person(name)):
+        with pytest.raises(Refused) as refused:
+            act()
+        assert refused.value.code == "name"
+    assert [path.name for path in tmp_path.rglob("*")] == ["in"]
+
+
+def test_names_of_all_scripts_are_kept(tmp_path):
+    for name in ("Zoë", "李雷", "José Núñez", "Anne-Marie 2"):
+        assert begun(tmp_path, name).name == name
+    assert sorted(People(tmp_path).names()) == sorted(["Zoë", "李雷", "José Núñez", "Anne-Marie 2"])
+
+
+@pytest.mark.parametrize(
+    ("name", "language", "agreed", "code"),
+    [
+        ("Ada", "en", False, "consent"),
+        ("Ada", "xx", True, "language"),
+        ("Ida", "en", True, "taken"),
+    ],
+)
+def test_without_consent_nothing_begins(tmp_path, name, language, agreed, code):
+    begun(tmp_path)
+    with pytest.raises(Refused) as refused:
+        People(tmp_path).begin(name, language, agreed, DAY)
+    assert refused.value.code == code and People(tmp_path).names() == ["Ida"]
+
+
+def test_a_folder_holds_so_many_people_and_a_disk_so_much(tmp_path, monkeypatch):
+    begun(tmp_path)
+    monkeypatch.setattr(room, "MOST", 1)
+    with pytest.raises(Refused, match="100 people"):
+        begun(tmp_path, "Ada")
+    monkeypatch.setattr(room, "MOST", 2)
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 1e8}))
+    with pytest.raises(Refused, match="the disk is full") as refused:
+        begun(tmp_path, "Ada")
+    assert refused.value.status == 507 and People(tmp_path).names() == ["Ida"]
+
+
+def test_delete_leaves_nothing_and_nobody_else_loses_anything(tmp_path):
+    ida, ada = begun(tmp_path), begun(tmp_path, "Ada")
+    kept(ida, "consent", WEBM)
+    (ida.folder / "making" / "Ida.work").mkdir(parents=True)
+    (ida.folder / "making" / "Ida.work" / "lock").touch()
+    (ida.folder / "Ida.ico3d").write_bytes(b"avatar")
+    People(tmp_path).delete("Ida")
+    assert list(tmp_path.iterdir()) == [ada.folder]
+    with pytest.raises(Refused, match="nothing is recorded of Ida"):
+        People(tmp_path).person("Ida")
+
+
+def test_a_link_to_elsewhere_is_nobody(tmp_path):
+    begun(tmp_path / "other")
+    People(tmp_path / "mine")
+    (tmp_path / "mine" / "Ida").symlink_to(tmp_path / "other" / "Ida")
+    with pytest.raises(Refused):
+        People(tmp_path / "mine").delete("Ida")
+    assert (tmp_path / "other" / "Ida" / "consent.json").is_file()

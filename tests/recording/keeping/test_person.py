@@ -1,0 +1,118 @@
+"""Parts while they are recorded: chunks in order, breaks, retakes, what is no video."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from ico3d.recording.keeping import person as room
+from ico3d.recording.keeping.containers import suffix_of
+from ico3d.recording.refusals import Refused
+from support.studio_page.parts import begun, kept
+
+WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)
+MP4 = bytes(4) + b"ftypisom" + bytes(52)
+
+
+@pytest.fixture
+def person(tmp_path):
+    return begun(tmp_path)
+
+
+def _codes(act):
+    with pytest.raises(Refused) as refused:
+        act()
+    return refused.value.code, refused.value.status
+
+
+def test_chunks_follow_one_another_and_may_be_repeated(person):
+    assert person.append("left", "a1", 0, WEBM) == 64
+    assert person.append("left", "a1", 0, WEBM) == 64  # its answer was lost
+    assert person.append("left", "a1", 64, b"more") == 68
+    assert _codes(lambda: person.append("left", "a1", 70, b"x")) == ("gap", 409)
+    assert person.unfinished("left", "a1").read_bytes() == WEBM + b"more"
+
+
+def test_a_part_whose_page_was_closed_is_there_and_can_be_kept(person):
+    person.append("text-1", "a1", 0, WEBM)
+    person.append("text-1", "b2", 0, WEBM + b"longer")
+    (part,) = person.parts()
+    assert (part.id, part.take, part.report) == ("text-1", "b2", None)
+    person.keep("text-1", "b2", {"seconds": 2.0, "turn": None, "advice": []})
+    (part,) = person.parts()
+    assert (part.file.name, part.take) == ("text-1.webm", "")
+    assert part.report == {"seconds": 2.0, "turn": None, "advice": []}
+    assert sorted(f.name for f in (person.folder / "parts").iterdir()) == [
+        "text-1.json",
+        "text-1.webm",
+    ]
+
+
+def test_an_earlier_take_stays_until_the_new_one_is_kept(person):
+    kept(person, "left", WEBM + b"first")
+    person.append("left", "b2", 0, MP4)
+    assert person.part("left").file.read_bytes() == WEBM + b"first"
+    person.keep("left", "b2", {"seconds": 3.0, "turn": None, "advice": []})
+    assert person.part("left").file.name == "left.mp4"
+    assert not (person.folder / "parts" / "left.webm").exists()
+    person.remove("left")
+    assert person.part("left") is None and list(person.parts()) == []
+
+
+def test_what_is_no_video_is_not_even_begun(person):
+    for data in (b"<html>", b"#EXTM3U\nfile:///etc/passwd", b"ffconcat version 1.0\n", b""):
+        assert _codes(lambda data=data: person.append("upload", "a1", 0, data or b"x")) == (
+            "no-video",
+            415,
+        )
+    assert not (person.folder / "parts").exists()
+    assert suffix_of(b"RIFF\0\0\0\0AVI LIST") == ".avi"
+    assert suffix_of(b"RIFF\0\0\0\0WAVEfmt ") == ""
+
+
+@pytest.mark.parametrize(
+    ("id", "take"), [("../x", "a"), ("left", "../a"), ("left", ""), ("left", "a" * 33), ("x", "a")]
+)
+def test_only_known_parts_and_plain_takes(person, id, take):
+    assert _codes(lambda: person.append(id, take, 0, WEBM)) == ("part", 404)
+    assert _codes(lambda: person.unfinished(id, take)) == ("part", 404)
+
+
+def test_parts_and_takes_are_bounded(person, monkeypatch):
+    monkeypatch.setattr(room, "MOST_BYTES", 100)
+    person.append("left", "a1", 0, WEBM)
+    assert _codes(lambda: person.append("left", "a1", 64, bytes(37))) == ("large", 413)
+    person.append("upload", "a1", 0, WEBM + bytes(100))  # a whole video may be larger
+    for number in range(9):
+        person.append("right", f"t{number}", 0, WEBM)
+    assert len(list((person.folder / "parts").glob("right.*"))) == room.MOST_TAKES
+
+
+def test_a_disk_that_fills_up_loses_nothing_that_was_there(person, monkeypatch):
+    person.append("left", "a1", 0, WEBM)
+    opened = Path.open
+
+    class Full:
+        def __init__(self, stream):
+            self.stream = stream
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            self.stream.close()
+
+        def write(self, data):
+            self.stream.write(data[:3])
+            self.stream.flush()
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def truncate(self, size):
+            self.stream.truncate(size)
+
+    monkeypatch.setattr(Path, "open", lambda self, mode: Full(opened(self, mode)))
+    with pytest.raises(OSError, match="No space"):
+        person.append("left", "a1", 64, b"more")
+    monkeypatch.undo()
+    assert person.unfinished("left", "a1").read_bytes() == WEBM
+    assert person.append("left", "a1", 64, b"more") == 68

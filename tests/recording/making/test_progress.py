@@ -1,0 +1,45 @@
+"""What the page is shown while an avatar is made."""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ico3d.creating.events import Advanced, Looked, Made, Measured, Planned, Preview
+from ico3d.creating.looking.advice import Advice
+from ico3d.creating.looking.examine import Examination
+from ico3d.recording.making.progress import FACE, Progress, Reporter, read_progress
+
+ADVICE = (Advice("blur", "better", "blurred.", ((2, 3),)), Advice("face", "refused", "no face."))
+
+
+def test_events_become_steps_time_and_pictures(tmp_path):
+    clock = [0.0]
+    tell = Reporter(tmp_path, Progress("running", "quick"), lambda: clock[0])
+    tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, ADVICE, True)))
+    tell(Planned({"track": 10.0, "learn": 100.0, "measure": 5.0}, {}))
+    found = read_progress(tmp_path)
+    assert found is not None
+    assert (found.left, found.advice, found.step) == (115.0, ("at 2 to 3 s: blurred.",), "join")
+    tell(Advanced("track", 0.5, "…"))
+    assert tell.progress.left == 110.0
+    tell(Advanced("learn", 0.25, "…"))
+    tell(Advanced("learn", 0.5, "…"))  # at once: not written
+    assert (tell.progress.share, tell.progress.left) == (0.25, 80.0)
+    clock[0] = 2.0
+    tell(Advanced("learn", 0.75, "…"))
+    assert (tell.progress.share, tell.progress.left) == (0.75, 30.0)
+    tell(Preview(0.75, np.zeros((4, 8, 3), np.uint8)))
+    with Image.open(tmp_path / FACE) as picture:
+        assert picture.size == (8, 4)
+    tell(Made(Path("x.ico3d"), Path("strip.png"), Measured(30.5, None, 3), 1.0))
+    found = read_progress(tmp_path)
+    assert found == tell.progress
+    assert (found.step, found.faces, found.decibels, found.left) == ("bake", 1, 30.5, 0.0)
+
+
+def test_what_is_damaged_is_nothing(tmp_path):
+    assert read_progress(tmp_path) is None
+    for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}'):
+        (tmp_path / "progress.json").write_text(text)
+        assert read_progress(tmp_path) is None

@@ -1,0 +1,40 @@
+"""Servers of finished avatars: one for each, ended when they are to end."""
+
+import os
+import sys
+
+import pytest
+
+from ico3d.recording.making import talks
+from ico3d.recording.making.talks import Talks
+from ico3d.recording.refusals import Refused
+
+
+@pytest.fixture
+def avatar(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))  # of the tests
+    monkeypatch.setattr(talks, "TALK", "support.studio_page.pretended_talk")
+    file = tmp_path / "Ida.ico3d"
+    file.write_bytes(b"avatar")
+    return file
+
+
+def test_an_avatar_has_one_server_until_it_is_stopped(avatar):
+    serving = Talks("127.0.0.1", False)
+    url = serving.url(avatar)
+    assert url.startswith("http://127.0.0.1:") and url.endswith("/#key=a-b")
+    assert serving.url(avatar) == url
+    serving.stop("Ida")
+    assert serving.url(avatar) != url
+    (process, _) = serving._running["Ida"]
+    serving.close()
+    assert process.poll() is not None
+
+
+def test_what_is_not_made_or_does_not_start_is_said(avatar, tmp_path):
+    serving = Talks("127.0.0.1", False)
+    with pytest.raises(Refused, match="not made yet"):
+        serving.url(tmp_path / "Ada.ico3d")
+    avatar.write_bytes(b"")
+    with pytest.raises(Refused, match="cannot talk"):
+        serving.url(avatar)

@@ -1,0 +1,95 @@
+"""The making of an avatar: which video, when anew, and what becomes of errors."""
+
+import pytest
+
+from ico3d.creating.events import Advanced, Made, Measured
+from ico3d.errors import CaptureError
+from ico3d.recording.making import worker
+from ico3d.recording.making.places import Places
+from ico3d.recording.making.progress import read_progress
+from support.needs import needs
+from support.studio_page.parts import begun, kept, part_file
+
+pytestmark = needs("av")
+
+
+@pytest.fixture
+def person(tmp_path):
+    return begun(tmp_path / "recordings")
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The settings of each creation; what it makes is as long as its video."""
+    calls = []
+
+    def create(settings, tell):
+        calls.append(settings)
+        tell(Advanced("bake", 1.0, "made"))
+        settings.out.with_suffix(".work").mkdir(exist_ok=True)
+        settings.out.write_bytes(b"avatar of %d" % settings.video.stat().st_size)
+        tell(Made(settings.out, settings.out, Measured(30.0, None, 1), 1.0))
+
+    monkeypatch.setattr(worker, "create", create)
+    return calls
+
+
+def _recorded(person, tmp_path, *ids, frames=5):
+    data = part_file(tmp_path / "part.mp4", frames).read_bytes()
+    for id in ids:
+        kept(person, id, data)
+
+
+def test_parts_become_an_avatar_that_says_who_agreed(person, asked, tmp_path):
+    _recorded(person, tmp_path, "consent", "left", "text-1")
+    avatar = worker.make(person, "quick")
+    places = Places(person.folder)
+    assert avatar == places.avatar == person.folder / "Ida.ico3d" and avatar.is_file()
+    (settings,) = asked
+    assert (settings.video, settings.out.stem, settings.quality) == (places.joined, "Ida", "quick")
+    assert "ticked and spoken: “I am Ida." in settings.consent
+    assert (settings.licence, settings.made_by) == ("for this person's own use", "Ida")
+    found = read_progress(places.folder)
+    assert found is not None and (found.state, found.decibels) == ("made", 30.0)
+
+
+def test_the_same_parts_go_on_and_other_parts_begin_anew(person, asked, tmp_path):
+    _recorded(person, tmp_path, "consent", "text-1")
+    worker.make(person, "quick")
+    places = Places(person.folder)
+    mark = places.work / "trained"
+    mark.touch()
+    worker.make(person, "good")
+    assert mark.exists()
+    _recorded(person, tmp_path, "text-1", frames=9)  # a retake
+    first = places.avatar.read_bytes()
+    worker.make(person, "good")
+    assert not mark.exists() and places.avatar.read_bytes() != first
+
+
+def test_a_video_that_was_brought_takes_the_place_of_the_parts(person, asked, tmp_path):
+    _recorded(person, tmp_path, "consent", "text-1", "upload")
+    worker.make(person, "quick")
+    assert asked[0].video == person.folder / "parts" / "upload.mp4"
+
+
+def test_an_error_is_one_sentence_and_an_earlier_avatar_stays(person, asked, tmp_path, monkeypatch):
+    _recorded(person, tmp_path, "consent", "text-1")
+    avatar = worker.make(person, "quick").read_bytes()
+
+    def refuse(settings, tell):
+        raise CaptureError(f"{settings.video}: two faces are seen.")
+
+    monkeypatch.setattr(worker, "create", refuse)
+    with pytest.raises(CaptureError):
+        worker.make(person, "good")
+    found = read_progress(Places(person.folder).folder)
+    assert found is not None and (found.state, found.error) == ("failed", "two faces are seen.")
+    assert Places(person.folder).avatar.read_bytes() == avatar
+    assert {part.id for part in person.parts()} == {"consent", "text-1"}
+
+
+def test_nothing_recorded_is_said(person, asked, tmp_path):
+    _recorded(person, tmp_path, "consent")
+    with pytest.raises(CaptureError, match="there is no recording"):
+        worker.make(person, "quick")

@@ -1,0 +1,190 @@
+"""The server of the studio page: who is let in, what is taken, and that deleting is deleting."""
+
+import errno
+
+import pytest
+from starlette.testclient import TestClient
+
+from ico3d.chat.serving.sites import Sites
+from ico3d.cli import main
+from ico3d.errors import MissingModelError
+from ico3d.recording import app as server
+from ico3d.recording.guiding import seeing
+from ico3d.recording.keeping.person import Person
+from ico3d.recording.making.places import Places
+from ico3d.recording.making.progress import FACE, Progress, write_progress
+from support.needs import needs
+from support.studio_page.parts import part_file
+
+pytestmark = needs("av")
+KEY = "abcd-efgh-ijkl-mnop"
+HOME = "http://127.0.0.1:8766"
+
+
+def _lacking(*_):
+    raise MissingModelError("the face model is not installed.")
+
+
+@pytest.fixture
+def room(tmp_path, monkeypatch):
+    monkeypatch.setattr(seeing, "model_file", _lacking)
+    return server.open_room(tmp_path / "recordings", "127.0.0.1", False)
+
+
+def _client(room, sites=None, **headers):
+    app = server.make_app(room, "127.0.0.1", sites or Sites())
+    return TestClient(app, HOME, headers=headers, raise_server_exceptions=False)
+
+
+@pytest.fixture
+def video(tmp_path):
+    return part_file(tmp_path / "part.mp4", 10).read_bytes()
+
+
+@pytest.fixture
+def page(room, video):
+    """The page of somebody who agreed, by a tick and aloud."""
+    client = _client(room)
+    agreed = client.post("/recordings/Ida", json={"agreed": True, "language": "de"})
+    assert agreed.status_code == 201
+    for id in ("text-1", "upload"):
+        assert _send(client, id, video).json()["code"] == "unspoken"
+    assert _send(client, "consent", video).status_code == 200
+    return client
+
+
+def _send(page, id, data, take="a1", size=1000):
+    for at in range(0, len(data), size):
+        answer = page.post(
+            f"/recordings/Ida/takes/{id}/{take}",
+            params={"offset": at},
+            content=data[at : at + size],
+        )
+        if answer.status_code != 200:
+            return answer
+    return page.post(f"/recordings/Ida/takes/{id}/{take}/keep")
+
+
+def _state(status, id):
+    return next(part for part in status["parts"] if part["id"] == id)["state"]
+
+
+def test_nothing_is_recorded_before_somebody_agreed(room, video):
+    client = _client(room)
+    assert client.get("/recordings/").json()["people"] == []
+    refused = client.post("/recordings/Ida", json={"agreed": "yes", "language": "de"})
+    assert (refused.status_code, refused.json()["code"]) == (403, "consent")
+    assert _send(client, "left", video).json()["code"] == "unknown"
+    assert list(room.people.folder.iterdir()) == []
+
+
+def test_parts_arrive_in_pieces_and_are_shown_and_removed(page, room, video):
+    kept = _send(page, "text-1", video).json()
+    assert _state(kept, "text-1") == "kept" and _state(kept, "text-2") == "missing"
+    assert kept["parts"][0]["text"].startswith("Ich bin Ida. Ich bin einverstanden")
+    assert (
+        _state(kept, "consent") == "kept"
+        and kept["covered"]["sounds"] > 10
+        and kept["making"] is None
+        and not kept["avatar"]
+    )
+    shown = page.get("/recordings/Ida/parts/text-1")
+    assert (shown.content, shown.headers["content-type"]) == (video, "video/mp4")
+    assert shown.headers["cache-control"] == "no-store"
+    gone = page.delete("/recordings/Ida/parts/text-1").json()
+    assert _state(gone, "text-1") == "missing"
+    assert page.get("/recordings/Ida/parts/text-1").status_code == 404
+
+
+def test_a_file_that_is_no_video_is_gone_and_nothing_else(page, room, video):
+    _send(page, "text-1", video)
+    for data in (b"not at all", video[:60]):
+        answer = _send(page, "upload", data)
+        assert (answer.status_code, answer.json()["code"]) == (415, "no-video")
+    parts = room.people.folder / "Ida" / "parts"
+    names = {file.name for file in parts.iterdir() if not file.name.startswith("consent")}
+    assert names == {"text-1.json", "text-1.mp4"}
+
+
+def test_requests_are_bounded(page, monkeypatch):
+    monkeypatch.setattr(server, "LARGEST_CHUNK", 100)
+    monkeypatch.setattr(server, "LARGEST_PICTURE", 100)
+    big = bytes(101)
+    answers = [
+        page.post("/recordings/Ida/takes/left/a1", params={"offset": 0}, content=big),
+        page.post("/recordings/Ida/look", content=big),
+        page.post("/recordings/Ida/making", content=bytes(5000)),
+    ]
+    assert [answer.status_code for answer in answers] == [413] * 3
+    assert page.post("/recordings/Ida/look", content=b"x").json()["code"] == "picture"
+
+
+def test_a_full_disk_is_one_sentence(page, monkeypatch, video):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Person, "append", full)
+    answer = _send(page, "left", video)
+    assert (answer.status_code, answer.json()["code"]) == (507, "full")
+
+
+def test_without_a_tracker_the_page_is_told(page):
+    assert page.get("/recordings/").json()["lacking"] == "the face model is not installed."
+
+
+def test_the_progress_and_the_face_are_shown(page, room):
+    folder = Places(room.people.folder / "Ida").folder
+    folder.mkdir()
+    assert page.get("/recordings/Ida/making/face").status_code == 404
+    (folder / FACE).write_bytes(b"\xff\xd8")
+    write_progress(folder, Progress("made", "quick", "bake", 1.0, faces=2, decibels=30.0))
+    made = page.get("/recordings/Ida").json()["making"]
+    assert (made["state"], made["faces"], made["decibels"]) == ("made", 2, 30.0)
+    assert page.get("/recordings/Ida/making/face").headers["content-type"] == "image/jpeg"
+    assert page.post("/recordings/Ida/talk").json()["code"] == "unmade"
+    assert page.post("/recordings/Ida/making", json={"quality": "x"}).json()["code"] == "quality"
+
+
+def test_delete_removes_everything_and_late_pieces_bring_nothing_back(page, room, video):
+    _send(page, "text-1", video)
+    assert page.delete("/recordings/Ida").status_code == 204
+    assert list(room.people.folder.iterdir()) == []
+    late = page.post("/recordings/Ida/takes/left/a1", params={"offset": 0}, content=video)
+    assert late.json()["code"] == "unknown" and list(room.people.folder.iterdir()) == []
+
+
+def test_only_the_page_itself_and_who_has_the_key_come_in(room):
+    assert _client(room, Origin="http://evil.example").get("/recordings/").status_code == 403
+    assert _client(room, Host="evil.example").get("/recordings/").status_code == 403
+    sites = Sites(key=KEY)
+    client = _client(room, sites)
+    for path in ("/recordings/", "/recordings/Ida", "/recordings/Ida/parts/left"):
+        assert client.get(path).status_code == 401
+    assert client.delete("/recordings/Ida").status_code == 401
+    assert client.get("/recordings/", params={"token": "1.2.3"}).status_code == 401
+    assert client.post("/token", headers={"Authorization": "Bearer wrong"}).status_code == 401
+    token = client.post("/token", headers={"Authorization": f"Bearer {KEY}"}).json()["token"]
+    assert client.get("/recordings/", params={"token": token}).json()["people"] == []
+
+
+def test_the_first_page_is_that_of_the_studio_and_may_ask_for_the_camera(page):
+    first = page.get("/?token=1.x", follow_redirects=False)
+    assert first.headers["location"] == "studio?token=1.x"
+    assert "camera=(self)" in first.headers["permissions-policy"]
+
+
+def test_what_is_deleted_while_it_is_looked_at_stays_deleted(page, room, video, monkeypatch):
+    """Whoever deletes while a part is being kept wins."""
+
+    def delete(file, id):
+        room.people.delete("Ida")
+        return {"seconds": 1.0, "turn": None, "advice": []}
+
+    monkeypatch.setattr(room.eye, "report", delete)
+    assert _send(page, "left", video).json()["code"] == "unknown"
+    assert list(room.people.folder.iterdir()) == []
+
+
+def test_others_need_https(capsys):
+    assert main(["studio", "--host", "0.0.0.0", "--no-browser"]) == 1
+    assert "browsers give their camera only to HTTPS pages" in capsys.readouterr().err

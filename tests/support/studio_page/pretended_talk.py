@@ -1,0 +1,17 @@
+"""A server of an avatar that waits until it is ended; of an empty file it does not start."""
+
+import os
+import sys
+import threading
+from pathlib import Path
+
+from ico3d.recording.making.beside import end_with_parent
+
+if __name__ == "__main__":
+    end_with_parent()
+    bundle, host, scheme = sys.argv[1:]
+    if not Path(bundle).read_bytes():
+        sys.exit(1)
+    assert scheme == "plain"
+    print(f"Ida is at http://{host}:{os.getpid()}/#key=a-b (Ctrl+C ends)", flush=True)
+    threading.Event().wait()

@@ -1,0 +1,134 @@
+import { every } from '../lifetime.ts';
+import { byId } from '../ui/elements.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say, type Key, type Sentence } from '../words/text.ts';
+import { item } from './items.ts';
+import type { Making, Recordings, Status } from './recordings.ts';
+
+const STEPS = ['join', 'look', 'track', 'learn', 'measure', 'bake'] as const;
+const ASKED = 1500; // ms between two questions how far it is
+
+/** What the view of the making needs of the page around it. */
+export interface MakingPorts {
+  words: PageWords;
+  recordings: Recordings;
+  /** Something is wrong, or nothing any more. */
+  problem(sentence: Sentence | null): void;
+  failed(error: unknown): void;
+  changed(status: Status): void;
+}
+
+/** Shows the avatar as it is made: the steps in words, the face in pictures, and the talk at the end. */
+export class MakingView {
+  private readonly root: ParentNode;
+  private readonly ports: MakingPorts;
+  private status: Status | null = null;
+  private faces = 0;
+  private asking = false;
+  private lost = false; // the last question had no answer
+
+  constructor(root: ParentNode, ports: MakingPorts, signal: AbortSignal) {
+    this.root = root;
+    this.ports = ports;
+    const { recordings } = ports;
+    this.on('halt', async ({ name }) => ports.changed(await recordings.halt(name)));
+    this.on('again', async ({ name, making }) => ports.changed(await recordings.make(name, making!.quality)));
+    this.on('talk', ({ name }) => this.talk(name));
+    every(ASKED, signal, () => void this.ask().catch(ports.failed));
+  }
+
+  /** Shows how far somebody's avatar is; nothing for null. */
+  show(status: Status | null): void {
+    if (status?.name !== this.status?.name) this.faces = 0;
+    this.status = status;
+    if (status?.making) this.write(status, status.making);
+  }
+
+  private on(id: string, act: (status: Status) => Promise<void>): void {
+    byId(this.root, id).onclick = () => void (this.status && act(this.status).catch(this.ports.failed));
+  }
+
+  private async ask(): Promise<void> {
+    const { status } = this;
+    if (this.asking || status?.making?.state !== 'running') return;
+    this.asking = true;
+    try {
+      const now = await this.ports.recordings.status(status.name);
+      if (this.lost) this.ports.problem(null);
+      this.lost = false;
+      if (this.status?.name === now.name) this.ports.changed(now);
+    } catch (error) {
+      this.lost = true;
+      throw error;
+    } finally {
+      this.asking = false;
+    }
+  }
+
+  private async talk(name: string): Promise<void> {
+    const button = byId<HTMLButtonElement>(this.root, 'talk');
+    button.disabled = true;
+    this.ports.words.write(button, say('studio.talk.opening'));
+    try {
+      const url = new URL((await this.ports.recordings.talk(name)).url);
+      url.hostname = location.hostname; // under which this machine was reached
+      location.assign(url);
+    } finally {
+      button.disabled = false;
+      this.ports.words.write(button, say('studio.talk'));
+    }
+  }
+
+  private write(status: Status, making: Making): void {
+    const { root } = this;
+    const { words } = this.ports;
+    const isRunning = making.state === 'running';
+    words.write(byId(root, 'made'), titleOf(status, making));
+    byId(root, 'error').textContent = making.error;
+    words.write(byId(root, 'left'), isRunning ? leftOf(making.left) : '');
+    byId(root, 'steps').replaceChildren(...STEPS.map((step, number) => this.entry(step, number, making)));
+    byId(root, 'steps').hidden = making.state === 'made';
+    this.showFace(status.name, making.faces);
+    const decibels = making.decibels === null ? '' : say('studio.making.decibels', { n: Math.round(10 * making.decibels) / 10 });
+    words.write(byId(root, 'decibels'), decibels);
+    byId(root, 'halt').hidden = !isRunning;
+    byId(root, 'again').hidden = isRunning || making.state === 'made';
+    byId(root, 'talk').hidden = !status.avatar || isRunning;
+    byId(root, 'better').hidden = making.advice.length === 0;
+    byId(root, 'betters').replaceChildren(...making.advice.map(item));
+  }
+
+  private entry(step: (typeof STEPS)[number], number: number, making: Making): HTMLLIElement {
+    const row = document.createElement('li');
+    const name = document.createElement('span');
+    this.ports.words.write(name, say(`studio.step.${step}`));
+    row.append(name);
+    const now = STEPS.indexOf(making.step as (typeof STEPS)[number]);
+    row.dataset.state = number < now ? 'done' : number === now ? 'now' : 'later';
+    if (number === now && making.state === 'running') {
+      const bar = document.createElement('progress');
+      if (making.share > 0) bar.value = making.share;
+      this.ports.words.write(bar, say(`studio.step.${step}` as Key), 'label');
+      row.append(bar);
+    }
+    return row;
+  }
+
+  private showFace(name: string, faces: number): void {
+    const image = byId<HTMLImageElement>(this.root, 'face');
+    image.hidden = faces === 0;
+    image.parentElement!.hidden = image.hidden;
+    if (faces > 0 && faces !== this.faces) image.src = this.ports.recordings.face(name, faces);
+    this.faces = faces;
+  }
+}
+
+function titleOf({ name }: Status, { state }: Making): Sentence {
+  return state === 'running' ? say('studio.making', { name }) : say(`studio.making.${state}`, { name });
+}
+
+/** @param seconds that are left, if anybody knows */
+function leftOf(seconds: number | null): Sentence {
+  if (seconds === null) return say('studio.left.unknown');
+  return seconds < 60 ? say('studio.left.soon') : say('studio.left.minutes', { n: Math.round(seconds / 60) });
+}

@@ -1,0 +1,141 @@
+import { PageError } from '../errors.ts';
+import type { Server } from '../server.ts';
+import { isKey, say } from '../words/text.ts';
+
+/** One part of a recording, as the server tells it. */
+export interface Part {
+  id: string;
+  text: string;
+  state: 'missing' | 'broken' | 'kept';
+  take?: string; // of a part that broke off
+  seconds?: number;
+  advice?: string[]; // in English
+}
+
+/** Ways to turn the head. */
+export const TURNS = ['left', 'right', 'up', 'down'] as const;
+export type Turns = Record<(typeof TURNS)[number], number>;
+
+/** How far an avatar is. */
+export interface Making {
+  state: 'running' | 'stopped' | 'failed' | 'made';
+  quality: string;
+  step: string;
+  share: number;
+  left: number | null; // s
+  advice: string[]; // in English
+  faces: number; // pictures of the face so far
+  error: string; // in English
+  decibels: number | null;
+}
+
+/** Everything about one person. */
+export interface Status {
+  name: string;
+  language: string;
+  parts: Part[];
+  covered: { seconds: number; enough: number; turns: Turns; sounds: number; of_sounds: number };
+  making: Making | null;
+  avatar: boolean;
+}
+
+/** Who is recorded, and what the server can do. */
+export interface Overview {
+  people: string[];
+  consent: Record<string, string>;
+  qualities: string[];
+  lacking: string; // why there is no face tracker
+}
+
+/** What is told of a picture of the camera. */
+export interface Told {
+  word: string;
+  turned: Turns | null;
+}
+
+/** The server refused something; `status` is that of HTTP, 0 where it did not answer. */
+export class Refusal extends PageError {
+  readonly status: number;
+
+  constructor(status: number, code: string, text: string) {
+    const key = `studio.refused.${code}`;
+    super(status === 0 ? say('studio.lost') : isKey(key) ? say(key) : text);
+    this.status = status;
+  }
+}
+
+/** The recordings of a server: each call is one request, and throws a `Refusal`. */
+export class Recordings {
+  private readonly server: Server;
+
+  constructor(server: Server) {
+    this.server = server;
+  }
+
+  overview(): Promise<Overview> {
+    return this.ask('GET', '');
+  }
+
+  begin(name: string, language: string, agreed: boolean): Promise<Status> {
+    return this.ask('POST', at(name), JSON.stringify({ language, agreed }));
+  }
+
+  status(name: string): Promise<Status> {
+    return this.ask('GET', at(name));
+  }
+
+  delete(name: string): Promise<void> {
+    return this.ask('DELETE', at(name));
+  }
+
+  append(name: string, part: string, take: string, offset: number, data: Blob): Promise<{ size: number }> {
+    return this.ask('POST', at(name, 'takes', part, take), data, { offset: String(offset) });
+  }
+
+  keep(name: string, part: string, take: string): Promise<Status> {
+    return this.ask('POST', at(name, 'takes', part, take, 'keep'));
+  }
+
+  remove(name: string, part: string): Promise<Status> {
+    return this.ask('DELETE', at(name, 'parts', part));
+  }
+
+  look(name: string, part: string, picture: Blob): Promise<Told> {
+    return this.ask('POST', at(name, 'look'), picture, { part });
+  }
+
+  make(name: string, quality: string): Promise<Status> {
+    return this.ask('POST', at(name, 'making'), JSON.stringify({ quality }));
+  }
+
+  halt(name: string): Promise<Status> {
+    return this.ask('DELETE', at(name, 'making'));
+  }
+
+  talk(name: string): Promise<{ url: string }> {
+    return this.ask('POST', at(name, 'talk'));
+  }
+
+  /** Address of a part's video. */
+  video(name: string, part: string): string {
+    return this.server.recordings(at(name, 'parts', part), { at: String(Date.now()) });
+  }
+
+  /** Address of the picture of the face as it learns. */
+  face(name: string, number: number): string {
+    return this.server.recordings(at(name, 'making', 'face'), { number: String(number) });
+  }
+
+  private async ask<Answer>(method: string, path: string, body?: BodyInit, values?: Record<string, string>): Promise<Answer> {
+    const response = await fetch(this.server.recordings(path, values), { method, body, cache: 'no-store' }).catch(() => null);
+    if (response === null) throw new Refusal(0, '', '');
+    if (response.status === 204) return undefined as Answer;
+    const answer = (await response.json().catch(() => ({}))) as Answer & { code?: string; error?: string };
+    if (response.ok) return answer;
+    throw new Refusal(response.status, answer.code ?? '', answer.error ?? `${response.status} ${response.statusText}`);
+  }
+}
+
+function at(...names: string[]): string {
+  return names.map(encodeURIComponent).join('/');
+}

@@ -1,0 +1,296 @@
+import { every } from '../lifetime.ts';
+import { byId } from '../ui/elements.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { isKey, say, type Key, type Sentence } from '../words/text.ts';
+import { Camera } from './camera.ts';
+import { item } from './items.ts';
+import { showMeters } from './meters.ts';
+import { type Overview, type Part, type Recordings, type Status, type Told, type Turns } from './recordings.ts';
+import { Sending } from './sending.ts';
+
+const LOOKED = 400; // ms between two pictures for guidance
+const SHOWN = 250; // ms between two of the clock's
+const LONGEST = 60; // s of a part, after which it stops by itself
+const SLICE = 4 << 20; // bytes of a video that are sent at once
+const UPLOAD = 'upload';
+
+/** What the view of a person's recording needs of the page around it. */
+export interface RoomPorts {
+  words: PageWords;
+  recordings: Recordings;
+  /** Something is wrong, or nothing any more. */
+  problem(sentence: Sentence | null): void;
+  /** Shows an error. */
+  failed(error: unknown): void;
+  /** There is something new of the person. */
+  changed(status: Status): void;
+}
+
+/** Where somebody records the parts, brings a video, and has the avatar made. */
+export class Room {
+  private readonly root: ParentNode;
+  private readonly ports: RoomPorts;
+  private readonly camera: Camera;
+  private status: Status | null = null;
+  private current = '';
+  private sending: Sending | null = null;
+  private began = 0; // ms, of the recording
+  private looking = false;
+  private most = 0; // of the turn that is being recorded, 0 to 1
+
+  constructor(root: ParentNode, ports: RoomPorts, signal: AbortSignal) {
+    this.root = root;
+    this.ports = ports;
+    this.camera = new Camera(byId<HTMLVideoElement>(root, 'camera'), () => this.loseCamera());
+    this.on('open', () => this.open());
+    this.on('record', () => (this.camera.isRecording ? this.finish() : this.begin()));
+    this.on('salvage', () => this.change((name, { id, take }) => ports.recordings.keep(name, id, take!)));
+    this.on('remove', () => this.change((name, { id }) => ports.recordings.remove(name, id)));
+    this.on('next', async () => this.advance());
+    this.on('play', () => this.play());
+    this.on('close', async () => byId<HTMLDialogElement>(root, 'shown').close());
+    this.on('upload', async () => byId(root, 'file').click());
+    byId<HTMLDialogElement>(root, 'shown').onclose = () => byId<HTMLVideoElement>(root, 'replay').removeAttribute('src');
+    byId<HTMLInputElement>(root, 'file').onchange = () => void this.upload().catch(ports.failed);
+    byId<HTMLFormElement>(root, 'make').onsubmit = (event) => {
+      event.preventDefault();
+      void this.make().catch(ports.failed);
+    };
+    every(LOOKED, signal, () => void this.look().catch(() => {}));
+    every(SHOWN, signal, () => this.showClock());
+  }
+
+  /** What the server can do. */
+  equip({ qualities, lacking }: Overview): void {
+    byId(this.root, 'lacking').hidden = lacking === '';
+    const options = qualities.map((quality) => {
+      const option = new Option(quality, quality, quality === 'good', quality === 'good');
+      this.ports.words.write(option, say(`studio.quality.${quality}` as Key));
+      return option;
+    });
+    byId(this.root, 'quality').replaceChildren(...options);
+  }
+
+  /** Shows a person, at the part that is to be recorded next. */
+  show(status: Status): void {
+    const other = status.name !== this.status?.name;
+    this.status = status;
+    byId(this.root, 'text').lang = status.language;
+    if (other) this.current = this.next(status);
+    this.write();
+  }
+
+  /** Leaves the person; the camera goes off. */
+  leave(): void {
+    this.camera.close();
+    this.status = null;
+  }
+
+  private get part(): Part | undefined {
+    return this.status?.parts.find(({ id }) => id === this.current);
+  }
+
+  /** The part after the current one that was not recorded yet; the current one if all were. */
+  private next({ parts }: Status): string {
+    const open = parts.filter(({ id, state }) => id !== UPLOAD && state !== 'kept'); // consent is the first of all
+    return (open[0] ?? parts[0]!).id;
+  }
+
+  private advance(): void {
+    this.select(this.next(this.status!));
+  }
+
+  private on(id: string, act: () => Promise<void>): void {
+    byId(this.root, id).onclick = () => void act().catch(this.ports.failed);
+  }
+
+  private async open(): Promise<void> {
+    this.ports.problem(null);
+    await this.camera.open();
+    this.write();
+  }
+
+  private async begin(): Promise<void> {
+    this.ports.problem(null);
+    const { name } = this.status!;
+    this.sending = new Sending(this.ports.recordings, name, this.current, (lost) => this.ports.problem(lost ? say('studio.lost') : null));
+    [this.began, this.most] = [performance.now(), 0];
+    this.camera.record(this.sending, (error) => void this.breakOff(error));
+    this.write();
+  }
+
+  /** Ends a part and keeps it; the next one follows. */
+  private async finish(): Promise<void> {
+    const sending = this.sending;
+    this.sending = null;
+    await this.camera.stop();
+    this.write();
+    this.ports.words.write(byId(this.root, 'clock'), say('studio.saving'));
+    try {
+      if (sending) this.ports.changed(await sending.keep());
+      if (this.part?.advice?.length === 0) this.advance(); // else it is read first
+    } catch (error) {
+      this.ports.failed(error);
+      if (this.status) this.ports.changed(await this.ports.recordings.status(this.status.name));
+    }
+  }
+
+  /** Ends a part that the server does not take; what has arrived of it can still be kept. */
+  private async breakOff(error: unknown): Promise<void> {
+    if (!this.sending) return;
+    this.sending = null;
+    await this.camera.stop();
+    this.ports.failed(error);
+    this.ports.changed(await this.ports.recordings.status(this.status!.name));
+  }
+
+  private loseCamera(): void {
+    if (this.sending) void this.finish();
+    this.ports.problem(say('studio.camera.lost'));
+    this.write();
+  }
+
+  private async change(act: (name: string, part: Part) => Promise<Status>): Promise<void> {
+    this.ports.problem(null);
+    this.ports.changed(await act(this.status!.name, this.part!));
+  }
+
+  private async play(): Promise<void> {
+    const video = byId<HTMLVideoElement>(this.root, 'replay');
+    video.src = this.ports.recordings.video(this.status!.name, this.current);
+    byId<HTMLDialogElement>(this.root, 'shown').showModal();
+    await video.play().catch(() => {}); // the person can press the button
+  }
+
+  private async upload(): Promise<void> {
+    const input = byId<HTMLInputElement>(this.root, 'file');
+    const arrived = byId(this.root, 'arrived');
+    const file = input.files?.[0];
+    input.value = '';
+    if (!file) return;
+    const { words, recordings, problem, changed } = this.ports;
+    const sending = new Sending(recordings, this.status!.name, UPLOAD, (lost) => problem(lost ? say('studio.lost') : null));
+    problem(null);
+    arrived.hidden = false;
+    try {
+      for (let at = 0; at < file.size; at += SLICE) {
+        words.write(arrived, say('studio.uploading', { n: Math.floor((100 * at) / file.size) }));
+        await sending.add(file.slice(at, at + SLICE));
+      }
+      words.write(arrived, say('studio.saving'));
+      changed(await sending.keep());
+    } finally {
+      arrived.hidden = true;
+    }
+  }
+
+  private async make(): Promise<void> {
+    this.ports.problem(null);
+    const quality = byId<HTMLSelectElement>(this.root, 'quality').value;
+    const status = await this.ports.recordings.make(this.status!.name, quality);
+    this.camera.close();
+    this.ports.changed(status);
+  }
+
+  private select(id: string): void {
+    if (this.camera.isRecording) return;
+    this.current = id;
+    this.most = 0;
+    this.ports.words.write(byId(this.root, 'guide'), ''); // what was said was of another part
+    this.write();
+  }
+
+  private async look(): Promise<void> {
+    if (this.looking || !this.status || document.hidden) return;
+    this.looking = true;
+    try {
+      const picture = await this.camera.picture();
+      if (picture && this.status) this.tell(await this.ports.recordings.look(this.status.name, this.current, picture));
+    } finally {
+      this.looking = false;
+    }
+  }
+
+  private tell({ word, turned }: Told): void {
+    const key = `studio.guide.${word}`;
+    const guide = byId(this.root, 'guide');
+    this.ports.words.write(guide, isKey(key) && this.camera.isOpen ? say(key) : '');
+    guide.dataset.word = word;
+    const wanted = turned?.[this.current as keyof Turns];
+    const reached = byId<HTMLProgressElement>(this.root, 'reached');
+    reached.hidden = wanted === undefined;
+    this.most = Math.max(this.camera.isRecording ? this.most : 0, wanted ?? 0);
+    reached.value = this.most;
+  }
+
+  private showClock(): void {
+    if (!this.camera.isRecording) return;
+    const seconds = Math.floor((performance.now() - this.began) / 1000);
+    this.ports.words.write(byId(this.root, 'clock'), say('studio.recording', { n: seconds }));
+    if (seconds >= LONGEST) void this.finish();
+  }
+
+  private write(): void {
+    const { status, part, camera, root } = this;
+    if (!status || !part) return;
+    const { words } = this.ports;
+    const isText = part.id.startsWith('text-');
+    words.write(byId(root, 'task'), part.id === UPLOAD ? '' : say(`studio.task.${isText ? 'text' : part.id}` as Key));
+    byId(root, 'text').textContent = part.id === UPLOAD ? '' : part.text;
+    byId(root, 'clock').textContent = '';
+    const record = byId<HTMLButtonElement>(root, 'record');
+    words.write(record, say(camera.isRecording ? 'studio.stop' : part.state === 'missing' ? 'studio.record' : 'studio.record.again'));
+    record.classList.toggle('running', camera.isRecording);
+    record.hidden = !camera.isOpen || part.id === UPLOAD;
+    byId(root, 'open').hidden = camera.isOpen;
+    byId(root, 'salvage').hidden = camera.isRecording || part.state !== 'broken';
+    byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || this.isComplete(status);
+    byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
+    byId(root, 'advice').replaceChildren(...(part.advice ?? []).map(item));
+    byId(root, 'parts').replaceChildren(...status.parts.filter(isListed).map((one) => this.entry(one)));
+    showMeters(byId(root, 'meters'), words, status.covered);
+    const ready = this.isReady(status);
+    byId<HTMLButtonElement>(root, 'go').disabled = !ready || camera.isRecording;
+    byId(root, 'first').hidden = ready;
+    byId<HTMLButtonElement>(root, 'upload').disabled = !this.isAgreed;
+    if (!camera.isOpen) words.write(byId(root, 'guide'), '');
+    byId(root, 'reached').hidden ||= !camera.isOpen;
+  }
+
+  /** Whether the person said that they agree: that comes before all else. */
+  private get isAgreed(): boolean {
+    return this.status!.parts.some(({ id, state }) => id === 'consent' && state === 'kept');
+  }
+
+  private isReady({ parts }: Status): boolean {
+    return this.isAgreed && parts.filter(({ state }) => state === 'kept').length > 1;
+  }
+
+  private isComplete({ parts }: Status): boolean {
+    return parts.every(({ id, state }) => id === UPLOAD || state === 'kept');
+  }
+
+  /** A part in the list: chosen by pressing it. */
+  private entry(part: Part): HTMLLIElement {
+    const { words } = this.ports;
+    const [row, button, name, state] = (['li', 'button', 'span', 'span'] as const).map((tag) => document.createElement(tag));
+    const number = /^text-(\d+)$/.exec(part.id)?.[1];
+    words.write(name!, number ? say('studio.part.text', { n: Number(number) }) : say(`studio.part.${part.id}` as Key));
+    const shown = part.advice?.length ? 'better' : part.state;
+    words.write(state!, say(`studio.state.${shown}`, part.seconds === undefined ? undefined : { n: Math.round(10 * part.seconds) / 10 }));
+    button!.dataset.part = part.id;
+    button!.dataset.state = part.state;
+    button!.dataset.shown = shown;
+    button!.ariaPressed = String(part.id === this.current);
+    (button as HTMLButtonElement).disabled = part.id !== 'consent' && !this.isAgreed;
+    button!.append(name!, state!);
+    button!.onclick = () => this.select(part.id);
+    row!.append(button!);
+    return row as HTMLLIElement;
+  }
+}
+
+/** Whether a part is listed: a video that was brought only if there is one. */
+function isListed({ id, state }: Part): boolean {
+  return id !== UPLOAD || state !== 'missing';
+}

@@ -1,0 +1,74 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { Refusal, type Recordings, type Status } from '../../src/studio/recordings.ts';
+import { Sending } from '../../src/studio/sending.ts';
+import studio from '../../src/words/studio.json';
+import { addTexts, codeOf } from '../../src/words/text.ts';
+
+/** A server that takes pieces, and answers as it is told. */
+class Taking {
+  readonly calls: string[] = [];
+  readonly faults: Refusal[] = []; // of the next requests
+
+  async append(name: string, part: string, _: string, offset: number, data: Blob): Promise<{ size: number }> {
+    this.calls.push(`${name} ${part} ${offset} ${await data.text()}`);
+    this.fail();
+    return { size: offset + data.size };
+  }
+
+  async keep(): Promise<Status> {
+    this.calls.push('keep');
+    this.fail();
+    return { name: 'Ida' } as Status;
+  }
+
+  private fail(): void {
+    const fault = this.faults.shift();
+    if (fault) throw fault;
+  }
+}
+
+addTexts(studio);
+const NO_ANSWER = new Refusal(0, '', '');
+let server: Taking;
+let lost: boolean[];
+let sending: Sending;
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  [server, lost] = [new Taking(), []];
+  sending = new Sending(server as unknown as Recordings, 'Ida', 'left', (now) => lost.push(now));
+});
+afterEach(() => void vi.useRealTimers());
+
+test('pieces go in order, each behind those before', async () => {
+  void sending.add(new Blob(['one']));
+  void sending.add(new Blob(['']));
+  void sending.add(new Blob(['three']));
+  expect(await sending.keep()).toEqual({ name: 'Ida' });
+  expect(server.calls).toEqual(['Ida left 0 one', 'Ida left 3 three', 'keep']);
+  expect(lost).toEqual([]);
+});
+
+test('a server that does not answer gets the same piece again until it does', async () => {
+  server.faults.push(NO_ANSWER, NO_ANSWER);
+  void sending.add(new Blob(['one']));
+  const kept = sending.keep();
+  await vi.advanceTimersByTimeAsync(2500);
+  await kept;
+  expect(server.calls).toEqual(['Ida left 0 one', 'Ida left 0 one', 'Ida left 0 one', 'keep']);
+  expect(lost).toEqual([true, false]);
+});
+
+test('a piece that is refused ends it, and what follows is not sent', async () => {
+  server.faults.push(new Refusal(507, 'full', 'the disk is full.'));
+  await expect(sending.add(new Blob(['one']))).rejects.toThrow(/^The disk is full/);
+  await expect(sending.add(new Blob(['two']))).rejects.toThrow(Refusal);
+  await expect(sending.keep()).rejects.toThrow(Refusal);
+  expect(server.calls).toEqual(['Ida left 0 one']);
+});
+
+test('a refusal is said in the words of the page, where it has some', () => {
+  expect(codeOf(new Refusal(507, 'full', 'x').sentence)).toBe('studio.refused.full');
+  expect(codeOf(NO_ANSWER.sentence)).toBe('studio.lost');
+  expect(new Refusal(500, '', 'all is gone but x.').message).toBe('all is gone but x.');
+});
