@@ -1,7 +1,8 @@
 """The verbs `ico3d bench chat` and `ico3d bench sessions`; heavy imports happen when they run."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import tyro
 
@@ -77,22 +78,23 @@ class BenchChat:
 
 @dataclass(frozen=True)
 class BenchSessions:
-    """Lets many visitors talk with one server at once, and checks what each of them hears.
+    """Finds out how many visitors can talk with one server at once, and checks what each hears.
 
     All visitors ask within two seconds, twice. Voices are synthesised in advance, one tone for each
     visitor; faces are computed as always. Nobody may hear another visitor's tone, and each piece of
-    speech has to arrive before it is to be played.
+    speech has to arrive 150 ms before it is to be played. The number of visitors is doubled until
+    they are too many; the answer lies within a tenth.
 
     Attributes:
         bundle: The avatar to serve, by a separate process.
-        visitors: Number of visitors who talk at once.
+        visitors: Number of visitors who talk at once, instead of a search.
         microphones: Number of visitors with an open microphone in a silent room, to which the
             server listens.
         json: File for the figures.
     """
 
     bundle: tyro.conf.Positional[Path] = Path("demo")
-    visitors: int = 20
+    visitors: int | None = None
     microphones: int = 0
     json: Path | None = None
 
@@ -110,13 +112,37 @@ class BenchSessions:
         from ico3d.common.files import write_atomic
 
         set_up_log(verbose=False)
-        from ico3d.measure.talking import crowd, host
+        from ico3d.measure.talking import host
 
         with host.watched() as stolen:
-            visits = crowd.measure(self.bundle, self.visitors, self.microphones)
-        figures = crowd.figures(visits)
+            figures = self._search() if self.visitors is None else self._measure(self.visitors)
         if self.json is not None:
             told = figures | {"stolen_cores": stolen.cores}
             write_atomic(self.json, json.dumps(told, indent=1).encode())
-        Console().print(crowd.table(figures))
         Console().print(stolen.sentence())
+
+    def _measure(self, visitors: int) -> dict[str, Any]:
+        """Prints and returns what so many visitors heard."""
+        from rich.console import Console
+
+        from ico3d.measure.talking import crowd
+
+        figures = crowd.figures(crowd.measure(self.bundle, visitors, self.microphones))
+        Console().print(crowd.table(figures))
+        return figures
+
+    def _search(self) -> dict[str, Any]:
+        """Prints and returns how many visitors can talk at once."""
+        from rich.console import Console
+
+        from ico3d.measure.talking import crowd_search as searching
+
+        def trial(visitors: int) -> searching.Trial:
+            found = searching.tried(self.bundle, visitors, self.microphones)
+            Console().print(f"{visitors} visitors at once: {found.told}")
+            return found
+
+        trials = searching.search(trial)
+        found = searching.most_borne(trials)
+        Console().print(f"{found} visitors can talk at once.")
+        return {"visitors": found, "trials": [asdict(one) for one in trials]}
