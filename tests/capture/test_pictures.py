@@ -12,7 +12,7 @@ from ico3d.capture.reading import memory
 from ico3d.capture.reading.layer_cache import AHEAD, QUEUED, LayerCache, read_in_turn
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError, SettingsError
-from training.full_disk import files_of_at_most
+from support.full_disk import files_of_at_most
 
 CAMERA = Camera(2, 2, np.eye(3), np.eye(4))
 
