@@ -39,6 +39,8 @@ export default defineConfig({
   test: {
     globalSetup: 'support/scratch.ts',
     isolate: false, // loading three and Spark anew for each file takes longer than most of the tests
+    testTimeout: 120_000, // a machine with other work is slow, not wrong
+    hookTimeout: 120_000,
     projects: [
       { extends: true, test: { name: 'unit', include: ['test/**/*.test.ts'] } },
       {
@@ -50,8 +52,6 @@ export default defineConfig({
           globalSetup: ['support/scratch.ts', 'support/servers/shared.ts'],
           maxWorkers: 2, // much of a talk is waiting
           sequence: { groupOrder: 1 },
-          testTimeout: 120_000,
-          hookTimeout: 120_000,
         },
       },
       {
@@ -61,8 +61,6 @@ export default defineConfig({
           include: ['e2e/alone/*.spec.ts'], // these judge milliseconds: nothing else may load the machine
           maxWorkers: 1,
           sequence: { groupOrder: 2 },
-          testTimeout: 120_000,
-          hookTimeout: 120_000,
         },
       },
       {

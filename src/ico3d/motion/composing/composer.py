@@ -71,6 +71,7 @@ class Composer:
         self._words: tuple[Word, ...] = ()
         self._levels: Array = np.zeros(0)
         self._end: float | None = None
+        self._stresses: tuple[Accent, ...] | None = None  # None once more is known of the speech
         self._handed = start  # time up to which all is decided
         self._next = 0  # index of the first word whose accent is not decided
         self._cues: list[Cue] = []
@@ -88,10 +89,13 @@ class Composer:
             words: All words known so far, in order of time.
             levels: (n,) loudness known so far, from the beginning, dB (`accents.loudness`).
         """
-        self._words, self._levels = words, levels
+        if words is not self._words or levels is not self._levels:
+            self._words, self._levels, self._stresses = words, levels, None
 
     def end(self, seconds: float) -> None:
         """Says that all of the speech is known, and how long it is."""
+        if self._end is None:
+            self._stresses = None
         self._end = seconds
 
     def request(self, name: str) -> None:
@@ -112,8 +116,9 @@ class Composer:
         Later calls return nothing that begins before `until`.
         """
         self._new = []
-        ended = self._end is not None
-        stresses = accents(self._words, self._levels, ended)
+        if self._stresses is None:
+            self._stresses = accents(self._words, self._levels, self._end is not None)
+        stresses = self._stresses
         meant = meanings(self._words)
         self._make_wanted(until, stresses)
         for index, accent in enumerate(stresses):
@@ -134,7 +139,7 @@ class Composer:
             The releases.
         """
         self._new = []
-        self._words, self._wanted = (), []
+        self._words, self._wanted, self._stresses = (), [], None
         for cue in list(self._held.values()):
             self._release(cue, max(now, self._earliest(cue)))
         return sorted(self._new, key=_moment)
