@@ -80,6 +80,7 @@ def draw_lines(path: Path, lines: Mapping[str, Sequence[float | None]], x: str, 
     figure, axes = new_figure(9, y)
     for label, values in lines.items():
         axes.plot([np.nan if v is None else v for v in values], ".-", label=label, linewidth=1)
+    axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set_xlabel(x)
     axes.legend(fontsize=8)
     save_figure(figure, path)
