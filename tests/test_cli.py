@@ -1,5 +1,6 @@
 """The command line: verbs and their groups, every setting an option, presets in --help."""
 
+import os
 import re
 import subprocess
 import sys
@@ -183,3 +184,11 @@ assert not heavy, heavy
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_processes_that_are_started_import_nothing_from_the_current_folder(monkeypatch, capsys):
+    monkeypatch.setenv("PYTHONSAFEPATH", "")
+    monkeypatch.delenv("PYTHONSAFEPATH")
+    monkeypatch.setattr(sys, "argv", ["ico3d", "--version"])
+    assert cli.main() == 0 and capsys.readouterr().out.startswith("ico3d ")
+    assert os.environ["PYTHONSAFEPATH"] == "1"

@@ -213,12 +213,13 @@ async def flooding(target: Target) -> dict[str, bool]:
         try:
             async with target.socket(f"203.0.113.{30 + machine}") as socket:
                 await socket.send(hello)
-                for frame in flood:
-                    await socket.send(frame)
-                await asyncio.wait_for(socket.wait_closed(), 30)  # the backlog is read first
-                ends.append(socket.close_code)
-        except (ConnectionClosed, TimeoutError) as error:
-            ends.append(getattr(getattr(error, "rcvd", None), "code", "open"))
+                read = asyncio.create_task(reading(socket))  # else its end would not be seen
+                with contextlib.suppress(ConnectionClosed):
+                    for frame in flood:
+                        await socket.send(frame)
+                ends.append(await asyncio.wait_for(read, 30))
+        except TimeoutError:
+            ends.append("open")
         except (WebSocketException, OSError) as error:
             ends.append(type(error).__name__)
     print("  floods end with", dict(zip(floods, ends, strict=True)))
@@ -226,6 +227,14 @@ async def flooding(target: Target) -> dict[str, bool]:
         "floods end their connection": "open" not in ends,
         "it goes on": await target.get("health") == 200,
     }
+
+
+async def reading(socket) -> int | None:
+    """Reads to the end of a connection; the code with which it was closed."""
+    with contextlib.suppress(ConnectionClosed):
+        while True:
+            await socket.recv()
+    return socket.close_code
 
 
 async def being_slow(target: Target) -> dict[str, bool]:

@@ -1,6 +1,7 @@
 """The command line: one verb per step; each room is imported only when its verb is used."""
 
 import importlib
+import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -135,6 +136,8 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         The exit status: 0, 1 for an error the user can mend, 2 for an unknown verb.
     """
+    if arguments is None:  # what is started imports nothing from the folder that we are in
+        os.environ.setdefault("PYTHONSAFEPATH", "1")
     words = sys.argv[1:] if arguments is None else arguments
     if words == ["--version"]:
         print(f"ico3d {__version__}")

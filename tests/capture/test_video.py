@@ -1,7 +1,12 @@
 """Damaged films, as `bench/fuzz` found them: read, or one sentence."""
 
+from fractions import Fraction
+
+import av
+import numpy as np
 import pytest
 
+from ico3d.capture import video
 from ico3d.capture.multiview.clip import Clip
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError
@@ -37,3 +42,33 @@ def test_remarks_in_another_encoding_do_not_matter(tmp_path):
     film = damaged(tmp_path / "a.mp4", b"\xff\xfeav", b"Lavf")
     assert len(list(open_video(film, 48).frames(25.0))) == 10
     assert Clip(film).count == 10
+
+
+def test_pictures_far_apart_are_not_repeated_for_ever(tmp_path):
+    film = tmp_path / "a.webm"
+    with av.open(str(film), "w") as container:
+        stream = container.add_stream("libvpx", rate=25)
+        stream.width = stream.height = 16
+        for milliseconds in (0, 10**10):
+            frame = av.VideoFrame.from_ndarray(np.zeros((16, 16, 3), np.uint8), "rgb24")
+            frame.pts, frame.time_base = milliseconds, Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with pytest.raises(CaptureError, match=r"is longer than 7200 s\.$"):
+        next(open_video(film, 16).frames(25.0))
+
+
+def test_a_list_of_other_files_is_no_film(tmp_path):
+    write_film(tmp_path / "other.mp4")
+    film = tmp_path / "a.mp4"
+    film.write_text("ffconcat version 1.0\nfile other.mp4\n")
+    for read in (lambda: open_video(film, 48), lambda: Clip(film).count):
+        with pytest.raises(CaptureError, match="as a video"):
+            read()
+
+
+def test_pictures_larger_than_cameras_make_are_not_decoded(tmp_path, monkeypatch):
+    write_film(tmp_path / "a.mp4")
+    monkeypatch.setattr(video, "MOST_PIXELS", 64 * 48 - 1)
+    with pytest.raises(CaptureError, match="cannot be decoded as a video"):
+        open_video(tmp_path / "a.mp4", 48)

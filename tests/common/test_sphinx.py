@@ -64,3 +64,11 @@ async def test_one_that_died_is_followed_by_another():
     process = decoder._process
     await decoder.close()
     assert process.returncode == 0
+
+
+async def test_it_imports_nothing_from_the_folder_of_its_start(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pocketsphinx.py").write_text("raise SystemExit('taken over')")
+    decoder = SphinxProcess()
+    assert await decoder.finish() == ""
+    await decoder.close()

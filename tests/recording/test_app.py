@@ -106,6 +106,11 @@ def test_a_file_that_is_no_video_is_gone_and_nothing_else(page, room, video):
     assert names == {"text-1.json", "text-1.mp4"}
 
 
+def test_a_form_nested_deep_is_none(page):
+    answer = page.post("/recordings/Ida/making", content=b"[" * 4000)
+    assert (answer.status_code, answer.json()["code"]) == (400, "quality")
+
+
 def test_requests_are_bounded(page, monkeypatch):
     monkeypatch.setattr(server, "LARGEST_CHUNK", 100)
     monkeypatch.setattr(server, "LARGEST_PICTURE", 100)

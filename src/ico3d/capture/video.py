@@ -9,10 +9,17 @@ import numpy as np
 
 from ico3d.capture.capture import Sound
 from ico3d.capture.sound import check_claim
-from ico3d.common.sound import Claim
+from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
 SOUND_RATE = 16_000
+MOST_PIXELS = 8192 * 4320
+"""Largest size of a video's pictures: what cameras record at most."""
+FORMATS = (
+    "mov,mp4,matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,ivf,flv,asf,ogg,mxf,nut,gif,"
+    "dv,rm,y4m,yuv4mpegpipe"
+)
+"""Kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
 
 
 @dataclass
@@ -51,7 +58,8 @@ class Video:
             uint8 RGB (height, width, 3), contiguous.
 
         Raises:
-            CaptureError: If not a single picture can be decoded.
+            CaptureError: If not a single picture can be decoded, or the video is longer than
+                `RECORDING`: two pictures far apart would be repeated for ever in between.
         """
         count, before = 0, None
         for now in self._timed():
@@ -66,11 +74,10 @@ class Video:
 
     def _timed(self) -> Iterator[tuple[float, np.ndarray]]:
         """Every picture of the file with its seconds after the first one."""
-        import av
-
-        with av.open(str(self.path), metadata_errors="replace") as container:
+        with opened(self.path) as container:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
+            _limit(stream)
             first = None
             for frame in decoded_frames(container, stream):
                 if frame is None:
@@ -79,6 +86,8 @@ class Video:
                 self.decoded += 1
                 seconds = frame.time if frame.time is not None else (first or 0.0) + self.decoded
                 first = seconds if first is None else first
+                if seconds - first > RECORDING:
+                    raise CaptureError(f"{self.path}: is longer than {RECORDING:g} s.")
                 self.times.append(seconds - first)
                 yield self.times[-1], self._picture(frame)
 
@@ -91,6 +100,24 @@ class Video:
         return np.ascontiguousarray(np.rot90(scaled.to_ndarray(), turns))
 
 
+def opened(path: Path) -> Any:
+    """A PyAV container of a file, which cannot make FFmpeg open another file or an address.
+
+    Raises:
+        FFmpegError: If it is no video, or is a play list.
+        OSError: If it cannot be read.
+    """
+    import av
+
+    bounds = {"format_whitelist": FORMATS, "protocol_whitelist": "file"}
+    return av.open(str(path), metadata_errors="replace", container_options=bounds)
+
+
+def _limit(stream: Any) -> None:
+    """Has the decoder refuse larger pictures than the file states, which would fill the memory."""
+    stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+
+
 def open_video(path: Path, size: int) -> Video:
     """Opens a video file and reads its facts.
 
@@ -101,18 +128,18 @@ def open_video(path: Path, size: int) -> Video:
     Raises:
         CaptureError: If the file is missing, is no video, or cannot be opened.
     """
-    import av
     from av.error import FFmpegError
 
     if not path.is_file():
         raise CaptureError(f"there is no video file at {path}.")
     try:
-        with av.open(str(path), metadata_errors="replace") as container:
+        with opened(path) as container:
             if not container.streams.video:
                 raise CaptureError(f"{path} holds no video stream.")
             stream = container.streams.video[0]
             if stream.codec_context is None:
                 raise CaptureError(f"{path}: its video is of a kind that cannot be decoded here.")
+            _limit(stream)
             width, height = stream.codec_context.width, stream.codec_context.height
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1
@@ -138,7 +165,7 @@ def read_sound(path: Path) -> Sound | None:
     import av
     import soxr
 
-    with av.open(str(path), metadata_errors="replace") as container:
+    with opened(path) as container:
         if not container.streams.audio or container.streams.audio[0].codec_context is None:
             return None
         stream, offset = container.streams.audio[0], _sound_offset(container)

@@ -36,7 +36,8 @@ class SphinxProcess:
         async with self._starting:
             if self._process is None:
                 self._process = await asyncio.create_subprocess_exec(
-                    *(sys.executable, "-m", __name__),
+                    # -P: nothing is imported from the folder in which somebody starts the server
+                    *(sys.executable, "-P", "-m", __name__),
                     stdin=asyncio.subprocess.PIPE,
                     stdout=asyncio.subprocess.PIPE,
                 )

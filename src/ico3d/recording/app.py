@@ -285,7 +285,7 @@ async def _form(request: Request) -> dict[str, Any]:
     """
     try:
         form = json.loads(await _body(request, LARGEST_FORM))
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return form if isinstance(form, dict) else {}
 

@@ -217,7 +217,8 @@ async def test_private_addresses_must_be_listed_themselves():
 @pytest.mark.parametrize(
     "address",
     ["127.0.0.1", "10.1.2.3", "192.168.0.1", "169.254.169.254", "::1", "fe80::1%eth0",
-     "::ffff:127.0.0.1", "0.0.0.0", "224.0.0.1", "fd00::1", "100.64.0.1"],
+     "::ffff:127.0.0.1", "0.0.0.0", "224.0.0.1", "fd00::1", "100.64.0.1",
+     "64:ff9b::7f00:1", "64:ff9b:1::a00:1", "2002:7f00:1::", "::127.0.0.1", "fec0::1"],
 )  # fmt: skip
 def test_addresses_that_lead_into_the_house(address):
     with pytest.raises(Refused):
@@ -225,7 +226,8 @@ def test_addresses_that_lead_into_the_house(address):
 
 
 def test_listed_addresses_are_called_at_their_port_only():
-    check_address("93.184.215.14", "example.org", 443, ())
+    for public in ("93.184.215.14", "2606:2800:21f::1", "64:ff9b::5db8:d70e"):
+        check_address(public, "example.org", 443, ())
     check_address("192.168.0.5", "nas.local", 80, ("nas.local", "192.168.0.5"))
     check_address("::1", "localhost", 9000, ("localhost:9000",))
     check_address("fd00::5", "nas.local", 8000, ("[fd00::5]:8000",))

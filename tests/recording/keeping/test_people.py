@@ -26,6 +26,8 @@ def test_consent_is_written_as_bundles_state_it(tmp_path):
     assert person.consent()["consent"].startswith("agreed on 2026-11-24, ticked and spoken: “I")
     kept(person, "consent", WEBM)
     assert person.consent()["consent"].count("spoken") == 1
+    person.remove("consent")
+    assert person.consent()["consent"] == about.consent
 
 
 @pytest.mark.parametrize(

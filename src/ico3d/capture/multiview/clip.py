@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ico3d.capture.video import decoded_frames
+from ico3d.capture.video import decoded_frames, opened
 from ico3d.errors import CaptureError, MissingExtraError
 
 MOST_OPEN = 4
@@ -183,12 +183,11 @@ class _Decoder:
 def _opened(path: Path) -> Any:
     """A container with a video stream."""
     try:
-        import av
         from av.error import FFmpegError
     except ImportError:
         raise MissingExtraError("av", "train", "reading videos") from None
     try:
-        container = av.open(str(path), metadata_errors="replace")
+        container = opened(path)
     except FileNotFoundError as error:
         raise CaptureError(f"{path} is missing.") from error
     except (FFmpegError, OSError, ValueError) as error:

@@ -19,9 +19,9 @@ from prometheus_client import (
     Histogram,
     ProcessCollector,
     generate_latest,
-    start_http_server,
 )
 
+from ico3d.chat.observing.figures_server import serve_figures
 from ico3d.chat.observing.timing import Turn
 from ico3d.errors import SettingsError
 
@@ -160,14 +160,14 @@ class Monitor:
             SettingsError: If the port cannot be opened.
         """
         try:
-            server, _ = start_http_server(port, host, registry=self._registry)
+            found = serve_figures(self._registry, host, port)
         except OSError as error:
             raise SettingsError(
                 f"port {port} on {host} cannot be used for figures ({error.strerror}): "
                 "choose another one with --metrics-port."
             ) from error
         shown = f"[{host}]" if ":" in host else host
-        return f"http://{shown}:{server.server_port}/metrics"
+        return f"http://{shown}:{found}/metrics"
 
 
 class Visitor:

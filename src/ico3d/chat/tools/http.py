@@ -25,6 +25,8 @@ from ico3d.errors import SettingsError
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
 MOST_REDIRECTS = 3
 REDIRECTS = (301, 302, 303, 307, 308)
+GLOBAL, NAT64 = ipaddress.ip_network("2000::/3"), ipaddress.ip_network("64:ff9b::/96")
+"""IPv6 addresses of the internet, and those of IPv4 hosts in networks that have IPv6 alone."""
 
 
 class Refused(OSError):
@@ -66,15 +68,22 @@ def check_address(address: str, host: str, port: int, allow: tuple[str, ...]) ->
         Refused: If the address may not be called.
     """
     ip = ipaddress.ip_address(address.partition("%")[0])
-    if isinstance(ip, ipaddress.IPv6Address) and ip.ipv4_mapped:
-        ip = ip.ipv4_mapped
-    if ip.is_global and not ip.is_multicast:
+    if isinstance(ip, ipaddress.IPv6Address):
+        ip = _inside(ip)
+    if ip.is_global and not ip.is_multicast and (ip.version == 4 or ip in GLOBAL):
         return
     shown = f"[{ip}]" if ip.version == 6 else str(ip)
     names = [shown, "localhost"] if ip.is_loopback and host == "localhost" else [shown]
     ends = ["", f":{port}"] if port in PORTS.values() else [f":{port}"]
     if not any(name + end in allow for name in names for end in ends):
         raise Refused(f"{host} is at the private address {ip}, which is not in 'allow'")
+
+
+def _inside(ip: ipaddress.IPv6Address) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
+    """The IPv4 address to which packets for an IPv6 address go; itself for any other."""
+    if ip in NAT64:
+        return ipaddress.IPv4Address(int(ip) & 0xFFFFFFFF)
+    return ip.ipv4_mapped or ip.sixtofour or ip
 
 
 def http_function(tool: Tool, allow: tuple[str, ...]) -> FunctionSchema:

@@ -181,10 +181,15 @@ async def over_http(server: McpServer) -> AsyncIterator["Client"]:
     from mcp import Client
     from mcp.client.streamable_http import streamable_http_client
 
+    from ico3d.chat.tools.bounded_http import BoundedTransport
+
     headers = filled_in(server.headers, server.where)
     limits = httpx2.Timeout(server.seconds, read=None)  # a stream is silent between calls
+    sending = BoundedTransport(trust_env=False)
     async with (
-        httpx2.AsyncClient(headers=headers, timeout=limits, trust_env=False) as http,
+        httpx2.AsyncClient(
+            headers=headers, timeout=limits, trust_env=False, transport=sending
+        ) as http,
         Client(streamable_http_client(server.url, http_client=http)) as client,
     ):
         yield client

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from ico3d.capture.face.mediapipe_face import FaceReader
-from ico3d.capture.video import open_video, read_sound
+from ico3d.capture.video import MOST_PIXELS, open_video, opened, read_sound
 from ico3d.common.weights import model_file
 from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.picture_checks import picture_advice
@@ -24,8 +24,6 @@ SIDE = 512
 """Upper limit of the short side of parts that are looked at, in pixels, as `ico3d create` has."""
 MOST_SIDE = 2000
 """Largest side of a picture that a page may send."""
-MOST_PIXELS = 8192 * 4320
-"""Largest size of a video's pictures: what cameras record at most."""
 RATE = 3.0
 """Pictures per second of a part that are looked at."""
 MIDDLE = 0.3
@@ -138,9 +136,7 @@ def _check_size(file: Path) -> None:
     Raises:
         Refused: If its file states more pixels than `MOST_PIXELS`.
     """
-    import av
-
-    with av.open(str(file), metadata_errors="replace") as container:
+    with opened(file) as container:
         sizes = [stream.width * stream.height for stream in container.streams.video]
     if max(sizes, default=0) > MOST_PIXELS:
         raise Refused("large", "the pictures of this video are larger than is taken.", 413)

@@ -16,6 +16,8 @@ PARTS = "parts"
 UNFINISHED = ".part"
 MOST_BYTES, MOST_UPLOADED = 256 << 20, 2 << 30
 """Largest size of a recorded part, and of a video that is brought."""
+TICKED, TICKED_AND_SPOKEN = ", ticked: ", ", ticked and spoken: "
+"""How a person agreed, as their consent says it."""
 MOST_TAKES = 4
 """Unfinished takes of one part that are kept; older ones make room."""
 
@@ -147,7 +149,7 @@ class Person:
         for other in self._takes(id):
             other.unlink()
         if id == CONSENT:
-            self._state_spoken()
+            self._state(TICKED, TICKED_AND_SPOKEN)
 
     def discard(self, id: str, take: str) -> None:
         """Removes a take that shows nothing."""
@@ -157,11 +159,13 @@ class Person:
         """Removes a part, its takes and what was found in it."""
         for file in self._parts.glob(f"{checked_id(id)}.*"):
             file.unlink()
+        if id == CONSENT:
+            self._state(TICKED_AND_SPOKEN, TICKED)
 
-    def _state_spoken(self) -> None:
-        """Adds to the consent that it was spoken, too."""
+    def _state(self, before: str, now: str) -> None:
+        """Says of the consent how it was given."""
         about = self.consent()
-        about["consent"] = about["consent"].replace(", ticked: ", ", ticked and spoken: ")
+        about["consent"] = about["consent"].replace(before, now)
         text = json.dumps(about, indent=1, ensure_ascii=False)
         write_atomic(self.folder / CONSENT_FILE, text.encode())
 

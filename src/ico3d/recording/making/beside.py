@@ -30,13 +30,15 @@ def end_with_parent() -> None:
 def start(module: str, words: Sequence[str], out: IO[bytes] | int) -> subprocess.Popen[bytes]:
     """Starts a module of ico3d in a process group of its own.
 
+    It imports nothing from the folder in which the server was started (`-P`).
+
     Args:
         module: Its name.
         words: Its arguments.
         out: What takes its output and its errors.
     """
     return subprocess.Popen(
-        [sys.executable, "-m", module, *words],
+        [sys.executable, "-P", "-m", module, *words],
         stdin=subprocess.PIPE,
         stdout=out,
         stderr=subprocess.STDOUT,
