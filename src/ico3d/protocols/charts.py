@@ -77,10 +77,12 @@ def draw_training(path: Path, runs: Mapping[str, tuple[Path, float]]) -> None:
 
 def draw_lines(path: Path, lines: Mapping[str, Sequence[float | None]], x: str, y: str) -> None:
     """Draws series of numbers over their places; None leaves a gap."""
+    from matplotlib.ticker import MaxNLocator
+
     figure, axes = new_figure(9, y)
     for label, values in lines.items():
         axes.plot([np.nan if v is None else v for v in values], ".-", label=label, linewidth=1)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel(x)
     axes.legend(fontsize=8)
     save_figure(figure, path)

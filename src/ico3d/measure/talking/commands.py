@@ -80,10 +80,10 @@ class BenchChat:
 class BenchSessions:
     """Finds out how many visitors can talk with one server at once, and checks what each hears.
 
-    All visitors ask within two seconds, twice. Voices are synthesised in advance, one tone for each
-    visitor; faces are computed as always. Nobody may hear another visitor's tone, and each piece of
-    speech has to arrive 150 ms before it is to be played. The number of visitors is doubled until
-    they are too many; the answer lies within a tenth.
+    All visitors come within two seconds, and ask within two seconds, twice. Voices are synthesised
+    in advance, one tone for each visitor; faces are computed as always. Nobody may hear another
+    visitor's tone, and each piece of speech has to arrive 150 ms before it is to be played. The
+    number of visitors is doubled until they are too many; the answer lies within a tenth.
 
     Attributes:
         bundle: The avatar to serve, by a separate process.

@@ -5,6 +5,7 @@ machines where the real services are slow or missing.
 """
 
 import asyncio
+import functools
 import itertools
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass, replace
@@ -138,8 +139,9 @@ class Voice(TTSService):
         yield TTSAudioRawFrame(sound.tobytes(), SPEECH_RATE, 1, context_id=context_id)
 
 
+@functools.lru_cache(maxsize=256)
 def tone(pitch: float, seconds: float) -> np.ndarray:
-    """A tone of `pitch` Hz, (S,) int16 at 24 kHz."""
+    """A tone of `pitch` Hz, (S,) int16 at 24 kHz; the same array for the same tone."""
     times = np.arange(int(seconds * SPEECH_RATE)) / SPEECH_RATE
     return (8000 * np.sin(2 * np.pi * pitch * times)).astype(np.int16)
 
