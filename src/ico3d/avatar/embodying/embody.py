@@ -39,6 +39,14 @@ RIM = 0.25
 """Width of the band of hair at the back edge of a face, relative to the height of the face."""
 CROWN = 0.1
 """How far above the brows that band begins, relative to the height of the face."""
+MIDDLE, SKULL, NAPE = 0.65, 0.72, 1.3
+"""A skull seen from the side: a circle about a point so far behind the brows, of this radius, both
+relative to the height of the face, and drawn out below the middle this many times.
+
+Hair outside, such as a tail, is left out: it is of the person on the body alone.
+"""
+LIKE_HAIR = 0.9
+"""Share of hair above which a Gaussian can belong to such a tail."""
 BOUND = 2.5
 """Most by which a colour's logit may change: more than from the palest skin to the darkest."""
 
@@ -65,6 +73,13 @@ class Face:
         """Distance in metres from the chin to the brows."""
         return float(np.linalg.norm(self.landmarks[BROWS].mean(0) - self.landmarks[CHIN]))
 
+    @property
+    def _up(self) -> np.ndarray:
+        """(3,) direction of length 1 from the chin to the brows, square to where the face looks."""
+        up = self.landmarks[BROWS].mean(0) - self.landmarks[CHIN]
+        up = up - self.region.forward * (up @ self.region.forward)
+        return up / np.linalg.norm(up)
+
     def on_cheeks(self, points: np.ndarray) -> np.ndarray:
         """(P,) bool, which of points (P, 3) lie on a cheek."""
         middles = np.array([self.landmarks[list(cheek)].mean(0) for cheek in CHEEKS])  # (2, 3)
@@ -73,9 +88,13 @@ class Face:
 
     def in_crown(self, points: np.ndarray) -> np.ndarray:
         """(P,) bool, which of points (P, 3) are above the ears, at any depth."""
-        up = self.landmarks[BROWS].mean(0) - self.landmarks[CHIN]
-        up = up / np.linalg.norm(up)
-        return (points - self.landmarks[BROWS].mean(0)) @ up > CROWN * self.height
+        return (points - self.landmarks[BROWS].mean(0)) @ self._up > CROWN * self.height
+
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        """(P,) bool, which of points (P, 3) are behind a skull and outside it."""
+        away = (points - self.landmarks[BROWS].mean(0)) / self.height
+        back, up = -away @ self.region.forward - MIDDLE, away @ self._up
+        return (back > 0) & (np.hypot(back, np.where(up < 0, up / NAPE, up)) > SKULL)
 
     def behind(self, points: np.ndarray) -> np.ndarray:
         """(P,) metres by which points (P, 3) are behind the plane behind the ears."""
@@ -121,6 +140,7 @@ def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
     behind = before.in_crown(means) & (before.behind(means) > 0)
     surfaces = surfaces_of(body.skinned, cast(body.skinned.rig), behind)
     kept = ~(surfaces.head & (face.region.depth(means) > 0))
+    kept &= ~((surfaces.hair > LIKE_HAIR) & before.beyond(means))
     idle = _idle(head, shown)
     skin, hair = _gains((idle, face), (_idle(body, own), before), there[torch.from_numpy(kept)])
     report(_gains_in_words(skin, hair))
