@@ -45,8 +45,6 @@ relative to the height of the face, and drawn out below the middle this many tim
 
 Hair outside, such as a tail, is left out: it is of the person on the body alone.
 """
-LIKE_HAIR = 0.9
-"""Share of hair above which a Gaussian can belong to such a tail."""
 BOUND = 2.5
 """Most by which a colour's logit may change: more than from the palest skin to the darkest."""
 
@@ -140,7 +138,7 @@ def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
     behind = before.in_crown(means) & (before.behind(means) > 0)
     surfaces = surfaces_of(body.skinned, cast(body.skinned.rig), behind)
     kept = ~(surfaces.head & (face.region.depth(means) > 0))
-    kept &= ~((surfaces.hair > LIKE_HAIR) & before.beyond(means))
+    kept &= ~((surfaces.head | (surfaces.hair > 0.5)) & before.beyond(means))
     idle = _idle(head, shown)
     skin, hair = _gains((idle, face), (_idle(body, own), before), there[torch.from_numpy(kept)])
     report(_gains_in_words(skin, hair))
