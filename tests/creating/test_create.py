@@ -8,6 +8,7 @@ import pytest
 from ico3d.avatar.baking import head_bundle
 from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.bundle.format import Bundle
+from ico3d.bundle.packaged import FILE
 from ico3d.cli import main
 from ico3d.creating import create as room
 from ico3d.creating import plan
@@ -86,6 +87,23 @@ def test_the_whole_way_and_again(tracked, settings, capfd):
     again = []
     assert create(settings, again.append).measured == made.measured
     assert [type(event) for event in again] == [Made] and len(tracked) == 1
+
+
+def test_on_the_body_of_another(tracked, settings, monkeypatch, capfd):
+    put = []
+
+    def run(embody):
+        put.append((embody.body.name, embody.head.name))
+        embody.out.write_bytes(embody.head.read_bytes())
+
+    monkeypatch.setattr(room.Embody, "run", run)
+    settings = replace(settings, body=FILE)
+    create(settings, [].append)
+    assert put == [(FILE.name, room.HEAD_ALONE)] and settings.out.is_file()
+    create(settings, [].append)
+    assert len(put) == 1
+    create(replace(settings, body=None), [].append)
+    assert len(put) == 1 and len(tracked) == 1
 
 
 def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):
