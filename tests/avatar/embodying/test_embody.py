@@ -18,6 +18,7 @@ from ico3d.errors import BundleError
 from support.avatars.filmed_demo import ABROAD
 from support.bundles.random_whole import write_random_whole
 from support.needs import needs
+from support.shared import MODELS
 
 pytestmark = [pytest.mark.slow, needs("mediapipe")]
 
@@ -53,8 +54,12 @@ def alone(tmp_path_factory):
 @pytest.fixture(scope="module")
 def landmarks():
     """(68, 3) landmarks of the packaged head, as its face is found."""
+    if not (MODELS / "face_landmarker.task").is_file():
+        pytest.skip("face_landmarker.task is not here: set ICO3D_MODELS")
     demo = Bundle.open(FILE)
-    return room._landmarks(demo, demo.require_head()[0])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ICO3D_MODELS", str(MODELS))
+        return room._landmarks(demo, demo.require_head()[0])
 
 
 @pytest.fixture(scope="module")

@@ -39,7 +39,7 @@ RIM = 0.25
 """Width of the band of hair at the back edge of a face, relative to the height of the face."""
 CROWN = 0.1
 """How far above the brows that band begins, relative to the height of the face."""
-MIDDLE, SKULL, NAPE = 0.65, 0.72, 1.3
+MIDDLE, SKULL, NAPE = 0.65, 0.68, 1.3
 """A skull seen from the side: a circle about a point so far behind the brows, of this radius, both
 relative to the height of the face, and drawn out below the middle this many times.
 
