@@ -28,7 +28,9 @@ DARKEST = 0.004
 """Least distance of a display colour from 0 and from 1, so that its logit is finite."""
 
 
-def drawn_colors(gaussians: Gaussians, middle: np.ndarray, parts: Sequence[Where]):
+def drawn_colors(
+    gaussians: Gaussians, middle: np.ndarray, parts: Sequence[Where]
+) -> list[np.ndarray | None]:
     """The median colour of each of some parts of a head's surface.
 
     Args:

@@ -1,7 +1,7 @@
 """Puts the head of one bundle on the body of another."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from ico3d.avatar import staging
 from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.baking.person_bundle import moved_head
 from ico3d.avatar.embodying.drawn_colors import drawn_colors
+from ico3d.avatar.embodying.face import Face
 from ico3d.avatar.embodying.surfaces import Surfaces, surfaces_of
 from ico3d.avatar.embodying.telling import told_together
 from ico3d.avatar.joining.finding.found_face import face_seeker
@@ -23,80 +24,14 @@ from ico3d.bundle.manifest import Loss, Manifest
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES
 from ico3d.bundle.skinned.info import SKINNED
-from ico3d.capture.face.region import BROWS, CHIN, HeadRegion
 from ico3d.errors import BundleError, ModelError
 from ico3d.motion.roles import cast
 from ico3d.splat.gaussians import Gaussians
 
 Report = Callable[[str], None]
 """Prints a line about the progress."""
-CHEEKS = ((2, 31, 36, 48), (14, 35, 45, 54))
-"""Multi-PIE landmarks about the right and the left cheek: jaw, nostril, eye, corner of the mouth.
-"""
-CHEEK = 0.16
-"""Radius of a cheek's middle, relative to the height of the face."""
-RIM = 0.25
-"""Width of the band of hair at the back edge of a face, relative to the height of the face."""
-CROWN = 0.1
-"""How far above the brows that band begins, relative to the height of the face."""
-MIDDLE, SKULL, NAPE = 0.65, 0.68, 1.3
-"""A skull seen from the side: a circle about a point so far behind the brows, of this radius, both
-relative to the height of the face, and drawn out below the middle this many times.
-
-Hair outside, such as a tail, is left out: it is of the person on the body alone.
-"""
 BOUND = 2.5
 """Most by which a colour's logit may change: more than from the palest skin to the darkest."""
-
-
-@dataclass(frozen=True)
-class Face:
-    """A face in canonical head space of the body.
-
-    Attributes:
-        landmarks: (68, 3) landmarks, metres.
-        region: The part of the space that belongs to the head.
-    """
-
-    landmarks: np.ndarray
-    region: HeadRegion
-
-    @staticmethod
-    def of(landmarks: np.ndarray) -> "Face":
-        """The face with these landmarks (68, 3)."""
-        return Face(landmarks, HeadRegion.around(landmarks))
-
-    @property
-    def height(self) -> float:
-        """Distance in metres from the chin to the brows."""
-        return float(np.linalg.norm(self.landmarks[BROWS].mean(0) - self.landmarks[CHIN]))
-
-    @property
-    def _up(self) -> np.ndarray:
-        """(3,) direction of length 1 from the chin to the brows, square to where the face looks."""
-        up = self.landmarks[BROWS].mean(0) - self.landmarks[CHIN]
-        up = up - self.region.forward * (up @ self.region.forward)
-        return up / np.linalg.norm(up)
-
-    def on_cheeks(self, points: np.ndarray) -> np.ndarray:
-        """(P,) bool, which of points (P, 3) lie on a cheek."""
-        middles = np.array([self.landmarks[list(cheek)].mean(0) for cheek in CHEEKS])  # (2, 3)
-        away = np.linalg.norm(points[:, None] - middles, axis=2)  # (P, 2)
-        return away.min(1) < CHEEK * self.height
-
-    def in_crown(self, points: np.ndarray) -> np.ndarray:
-        """(P,) bool, which of points (P, 3) are above the ears, at any depth."""
-        return (points - self.landmarks[BROWS].mean(0)) @ self._up > CROWN * self.height
-
-    def beyond(self, points: np.ndarray) -> np.ndarray:
-        """(P,) bool, which of points (P, 3) are behind a skull and outside it."""
-        away = (points - self.landmarks[BROWS].mean(0)) / self.height
-        back, up = -away @ self.region.forward - MIDDLE, away @ self._up
-        return (back > 0) & (np.hypot(back, np.where(up < 0, up / NAPE, up)) > SKULL)
-
-    def behind(self, points: np.ndarray) -> np.ndarray:
-        """(P,) metres by which points (P, 3) are behind the plane behind the ears."""
-        return self.region.behind_at - points @ self.region.forward
 
 
 def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
@@ -185,24 +120,11 @@ def _gains(
         (3,) for skin, from cheek to cheek, and (3,) for hair, from the back edge of the given head
         to what of the body is behind it. 0 where too little is seen of one of them.
     """
-    face = given[1]
-
-    def edge(points: np.ndarray) -> np.ndarray:
-        away = -face.behind(points)
-        return face.in_crown(points) & (away > 0) & (away < RIM * face.height)
-
-    def back(points: np.ndarray) -> np.ndarray:
-        away = face.behind(points)
-        return face.in_crown(points) & (away > 0) & (away < RIM * face.height)
-
-    skin, hair = drawn_colors(given[0], _middle(given[1]), [given[1].on_cheeks, edge])
-    (cheeks,) = drawn_colors(own[0], _middle(own[1]), [own[1].on_cheeks])
-    (behind,) = drawn_colors(rest, _middle(given[1]), [back])
+    face, before = given[1], own[1]
+    skin, hair = drawn_colors(given[0], face.middle, [face.on_cheeks, face.on_back_edge])
+    (cheeks,) = drawn_colors(own[0], before.middle, [before.on_cheeks])
+    (behind,) = drawn_colors(rest, face.middle, [face.just_behind])
     return _change(cheeks, skin), _change(behind, hair)
-
-
-def _middle(face: Face) -> np.ndarray:
-    return face.landmarks.mean(0)
 
 
 def _change(before: np.ndarray | None, after: np.ndarray | None) -> np.ndarray:
