@@ -9,6 +9,8 @@ from ico3d.avatar.baking.command import Bake
 from ico3d.avatar.baking.telling.about import provenance_of
 from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.avatar.embodying.command import Embody
+from ico3d.avatar.embodying.embody import body_in
+from ico3d.bundle.format import Bundle
 from ico3d.bundle.persona import Persona, read_persona
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
@@ -51,6 +53,7 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
         The avatar, and how good it is.
 
     Raises:
+        BundleError: If the bundle of the body cannot be used.
         CaptureError: If no avatar can be made of the video; the sentence says why.
         SettingsError: If the avatar's name or the folder belongs to something else, or nobody says
             that the person agreed.
@@ -60,6 +63,8 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
     """
     begin = time.monotonic()
     persona, said = _persona(settings), _statement(settings)
+    if settings.body is not None:
+        body_in(Bundle.open(settings.body))  # said before the work, not after it
     with workplace(settings) as place, full_disk(place.folder):
         if place.is_done(settings):
             return _made(settings, place, begin, tell)

@@ -56,29 +56,40 @@ def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
     """
     given, _ = head.require_head()
     own, poses = body.require_head()
-    if body.skinned is None or not body.manifest.is_whole:
-        raise BundleError(
-            f"the bundle of '{body.manifest.name}' has no body on a skeleton, which a head of "
-            "another person could move with."
-        )
+    skinned = body_in(body)
     faces = _landmarks(head, given), _landmarks(body, own)
     matrix, rest = canonical_from_head(faces[1], faces[0])
     report(fit_in_words(matrix, rest))
     placed = moved_head(given, matrix)
     face, before = Face.of(moved(matrix, faces[0])), Face.of(faces[1])
     shown = _cropped(placed, face)
-    there = SkinnedBody(body.skinned).window_gaussians(0, 0.0)
+    there = SkinnedBody(skinned).window_gaussians(0, 0.0)
     there = there.transform(np.linalg.inv(poses[0].astype(np.float64)))  # in head space
     means = there.means.numpy().astype(np.float64)  # (N, 3)
     behind = before.in_crown(means) & (before.behind(means) > 0)
-    surfaces = surfaces_of(body.skinned, cast(body.skinned.rig), behind)
+    surfaces = surfaces_of(skinned, cast(skinned.rig), behind)
     kept = ~(surfaces.head & (face.region.depth(means) > 0))
     kept &= ~((surfaces.head | (surfaces.hair > 0.5)) & before.beyond(means))
     idle = _idle(head, shown)
     skin, hair = _gains((idle, face), (_idle(body, own), before), there[torch.from_numpy(kept)])
     report(_gains_in_words(skin, hair))
-    tinted = _tinted(body.skinned, surfaces, skin, hair).chosen(np.flatnonzero(kept))
+    tinted = _tinted(skinned, surfaces, skin, hair).chosen(np.flatnonzero(kept))
     return _written(out, head, body, shown, tinted)
+
+
+def body_in(bundle: Bundle) -> BakedSkinned:
+    """The body that can stand in for that of another person.
+
+    Raises:
+        BundleError: If the bundle lacks a head, or a body on a skeleton.
+    """
+    bundle.require_head()
+    if bundle.skinned is None:
+        raise BundleError(
+            f"the bundle of '{bundle.manifest.name}' has no body on a skeleton, which a head of "
+            "another person could move with."
+        )
+    return bundle.skinned
 
 
 def _landmarks(bundle: Bundle, head: BakedHead) -> np.ndarray:
