@@ -64,6 +64,7 @@ VERBS: dict[str, Verb] = {
     "measure all": Verb("ico3d.protocols.commands", "MeasureAll", "every protocol, one report"),
     "measure viewer": Verb("ico3d.protocols.commands", "MeasureViewer", "frame rates: a report"),
     "bake": Verb("ico3d.avatar.baking.command", "Bake", "make the bundle that browsers play"),
+    "embody": Verb("ico3d.avatar.embodying.command", "Embody", "give a head alone a whole body"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "forget": Verb("ico3d.avatar.forgetting.command", "Forget", "remove what is here of a person"),

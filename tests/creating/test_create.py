@@ -8,6 +8,7 @@ import pytest
 from ico3d.avatar.baking import head_bundle
 from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.bundle.format import Bundle
+from ico3d.bundle.packaged import FILE
 from ico3d.cli import main
 from ico3d.creating import create as room
 from ico3d.creating import plan
@@ -16,8 +17,9 @@ from ico3d.creating.events import STEPS, Advanced, Looked, Made, Planned, Previe
 from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.examine import Examination
 from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
-from ico3d.errors import CaptureError, SettingsError, StorageError
+from ico3d.errors import BundleError, CaptureError, SettingsError, StorageError
 from ico3d.head.settings import Density, HeadSettings, Initial, Network
+from support.bundles.random_bundle import write_random_bundle
 from support.recordings.portrait_folder import write_folder
 
 pytestmark = pytest.mark.slow
@@ -86,6 +88,31 @@ def test_the_whole_way_and_again(tracked, settings, capfd):
     again = []
     assert create(settings, again.append).measured == made.measured
     assert [type(event) for event in again] == [Made] and len(tracked) == 1
+
+
+def test_on_the_body_of_another(tracked, settings, monkeypatch, capfd):
+    put = []
+
+    def run(embody):
+        put.append((embody.body.name, embody.head.name))
+        embody.out.write_bytes(embody.head.read_bytes())
+
+    monkeypatch.setattr(room.Embody, "run", run)
+    settings = replace(settings, body=FILE)
+    create(settings, [].append)
+    assert put == [(FILE.name, room.HEAD_ALONE)] and settings.out.is_file()
+    create(settings, [].append)
+    assert len(put) == 1
+    create(replace(settings, body=None), [].append)
+    assert len(put) == 1 and len(tracked) == 1
+
+
+def test_a_body_that_cannot_be_used_is_told_before_the_work(tracked, settings, tmp_path):
+    write_random_bundle(tmp_path / "head.ico3d", 60)
+    for body, why in (("head.ico3d", "no body on a skeleton"), ("none.ico3d", "no bundle at")):
+        with pytest.raises(BundleError, match=why):
+            create(replace(settings, body=tmp_path / body), print)
+    assert not tracked and not settings.out.exists()
 
 
 def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):

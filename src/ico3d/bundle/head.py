@@ -1,6 +1,6 @@
 """The baked head: tensors that a shader blends (docs/bundle.md, head.safetensors)."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -80,6 +80,11 @@ class BakedHead:
     def expression_size(self) -> int:
         """B, the number of values of an expression."""
         return self.w1.shape[0]
+
+    def chosen(self, indices: np.ndarray) -> "BakedHead":
+        """The head with some of its Gaussians, by indices (M,) in the order they are to have."""
+        parts = {name: self._tensors[name].take(indices, axis) for name, axis in _AXES.items()}
+        return replace(self, **parts)
 
     def to_bytes(self) -> bytes:
         """The content of `head.safetensors`.

@@ -8,6 +8,9 @@ from pathlib import Path
 from ico3d.avatar.baking.command import Bake
 from ico3d.avatar.baking.telling.about import provenance_of
 from ico3d.avatar.baking.telling.statement import Statement
+from ico3d.avatar.embodying.command import Embody
+from ico3d.avatar.embodying.embody import body_in
+from ico3d.bundle.format import Bundle
 from ico3d.bundle.persona import Persona, read_persona
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
@@ -32,6 +35,7 @@ SIZE = 512
 TRACKED = {FACES: (0.0, 0.1), CUTOUTS: (0.1, 0.3), POSES: (0.3, 1.0)}
 """Which share of tracking each of its steps begins and ends with."""
 QUALITY, STRIP = "quality.json", "strip.png"
+HEAD_ALONE = "head.ico3d"
 
 
 def create(settings: CreateSettings, tell: Tell) -> Made:
@@ -49,6 +53,7 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
         The avatar, and how good it is.
 
     Raises:
+        BundleError: If the bundle of the body cannot be used.
         CaptureError: If no avatar can be made of the video; the sentence says why.
         SettingsError: If the avatar's name or the folder belongs to something else, or nobody says
             that the person agreed.
@@ -58,6 +63,8 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
     """
     begin = time.monotonic()
     persona, said = _persona(settings), _statement(settings)
+    if settings.body is not None:
+        body_in(Bundle.open(settings.body))  # said before the work, not after it
     with workplace(settings) as place, full_disk(place.folder):
         if place.is_done(settings):
             return _made(settings, place, begin, tell)
@@ -154,15 +161,19 @@ def _bake(
     tell(Advanced("bake", 0.0, "making the avatar's file"))
     about = place.file("persona.json")
     write_atomic(about, json.dumps(plain(persona), indent=1).encode())
+    baked = settings.out if settings.body is None else place.file(HEAD_ALONE)
     Bake(
         place.head(settings.quality),
-        (capture, settings.out),
+        (capture, baked),
         persona=about,
         strip=place.file(STRIP),
         force=True,
         device=settings.device,
         statement=said,
     ).run()
+    if settings.body is not None:
+        tell(Advanced("bake", 0.7, "putting the head on a body"))
+        Embody(baked, settings.out, settings.body).run()
     tell(Advanced("bake", 1.0, "made"))
 
 

@@ -30,6 +30,8 @@ class CreateSettings:
         licence: Licence under which the avatar may be used; goes into the avatar's manifest.
         made_by: Who makes the avatar; by default the person NAME.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
+        body: A whole person on a skeleton, whose body stands in for that of which the video shows
+            nothing; `demo` is the avatar of the package. By default the avatar is a head alone.
     """
 
     video: Annotated[Path, tyro.conf.Positional]
@@ -40,6 +42,7 @@ class CreateSettings:
     licence: str = OWN_USE
     made_by: str = ""
     device: DeviceName = "auto"
+    body: Path | None = None
 
 
 @dataclass(frozen=True)

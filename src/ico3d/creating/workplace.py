@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from ico3d.bundle.packaged import bundle_path
 from ico3d.common.files import write_atomic
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import SettingsError, StorageError
@@ -118,11 +119,12 @@ def _check_same(place: Workplace, settings: CreateSettings) -> None:
 
 def _wanted(settings: CreateSettings, bundle: Path) -> dict:
     """What tells one avatar of a video from another."""
-    persona = settings.persona
+    persona, body = settings.persona, settings.body
     return {
         "quality": settings.quality,
         "persona": None if persona is None else _digest(persona),
         "bundle": _digest(bundle),
+        **({} if body is None else {"body": _digest(bundle_path(body))}),
     }
 
 

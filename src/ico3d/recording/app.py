@@ -290,13 +290,14 @@ async def _form(request: Request) -> dict[str, Any]:
     return form if isinstance(form, dict) else {}
 
 
-def open_room(folder: Path, host: str, tls: bool) -> Room:
+def open_room(folder: Path, host: str, tls: bool, body: Path | None = None) -> Room:
     """What a server of the studio page shares.
 
     Args:
         folder: Where the recordings are.
         host: Address to which it is bound.
         tls: Whether it serves by HTTPS.
+        body: A whole person whose body the avatars get; None makes heads alone.
     """
     people = People(folder)
-    return Room(people, Eye(), Makers(people), Talks(host, tls), defaultdict(asyncio.Lock))
+    return Room(people, Eye(), Makers(people, body), Talks(host, tls), defaultdict(asyncio.Lock))

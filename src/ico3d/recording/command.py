@@ -22,6 +22,8 @@ class Studio:
         tls: Serve by HTTPS, as browsers demand before they give the camera to another machine's
             page, with a certificate that this machine makes, keeps and renews.
         browser: Open the page in a browser.
+        body: A whole person on a skeleton, whose body stands in for that of everybody who records
+            themselves; `demo` is the avatar of the package. By default avatars are heads alone.
     """
 
     folder: Annotated[Path, tyro.conf.Positional] = Path("recordings")
@@ -29,6 +31,7 @@ class Studio:
     port: int = 8766
     tls: bool = False
     browser: bool = True
+    body: Path | None = None
 
     def run(self) -> None:
         """Serves until interrupted.
@@ -57,7 +60,7 @@ class Studio:
         sites = open_sites(Embedding(), key or "")
         listener = server.bind(self.host, self.port)
         try:
-            room = open_room(self.folder.absolute(), self.host, self.tls)
+            room = open_room(self.folder.absolute(), self.host, self.tls, self.body)
         except OSError as error:
             raise SettingsError(f"{self.folder} cannot be written ({error.strerror}).") from error
         app = make_app(room, self.host, sites, reach.answered)

@@ -8,7 +8,7 @@ import pytest
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Manifest
 from ico3d.bundle.packaged import FILE
-from ico3d.bundle.people.provenance import Provenance, check_consent
+from ico3d.bundle.people.provenance import Part, Provenance, check_consent
 from ico3d.errors import BundleError
 from support.bundles.random_bundle import random_head, random_manifest
 
@@ -32,6 +32,14 @@ def test_everything_is_carried():
         "made_by": "Bob",
         "made_on": "2026-11-24",
     }
+
+
+def test_what_comes_from_whom_is_carried():
+    parts = (Part("head", "portrait", "Ada"), Part("body", "synthetic", "nobody"))
+    assert stored(replace(FULL, parts=parts))["parts"] == [
+        {"name": "head", "kind": "portrait", "likeness": "Ada"},
+        {"name": "body", "kind": "synthetic", "likeness": "nobody"},
+    ]
 
 
 def test_what_is_not_stated_is_not_written_so_that_older_programs_can_read_it():

@@ -29,7 +29,7 @@ def people(tmp_path):
 @pytest.fixture
 def makers(people, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))  # of the tests
-    made = Makers(people, WORKER)
+    made = Makers(people, worker=WORKER)
     yield made
     made.close()
 
@@ -81,7 +81,7 @@ def test_a_server_that_comes_back_goes_on(people, makers):
     ida = Places(people.person("Ida").folder).folder
     ida.mkdir()
     write_progress(ida, Progress("running", "good"))  # there may be but one
-    again = Makers(people, WORKER)
+    again = Makers(people, worker=WORKER)
     try:
         again.go_on()
         _until(_began(ada).exists)

@@ -1,5 +1,7 @@
 """The making of an avatar: which video, when anew, and what becomes of errors."""
 
+from pathlib import Path
+
 import pytest
 
 from ico3d.creating.events import Advanced, Made, Measured
@@ -51,6 +53,16 @@ def test_parts_become_an_avatar_that_says_who_agreed(person, asked, tmp_path):
     assert (settings.licence, settings.made_by) == ("for this person's own use", "Ida")
     found = read_progress(places.folder)
     assert found is not None and (found.state, found.decibels) == ("made", 30.0)
+
+
+def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
+    _recorded(person, tmp_path, "consent", "text-1")
+    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
+    monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick", "demo"])
+    assert worker.main() == 0
+    monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick"])
+    assert worker.main() == 0
+    assert [settings.body for settings in asked] == [Path("demo"), None]
 
 
 def test_the_same_parts_go_on_and_other_parts_begin_anew(person, asked, tmp_path):

@@ -70,6 +70,13 @@ export interface SkinnedInfo {
   num_rest: number; // of the Gaussians, in a file of their own
 }
 
+/** Whose the head or the body is, where they come from different people. */
+export interface Part {
+  name: 'head' | 'body';
+  kind: string; // of the recordings
+  likeness: string;
+}
+
 /** Whose likeness the avatar is, who agreed, who made it of what; older bundles lack the optional entries. */
 export interface Provenance {
   kind: string; // of the recordings
@@ -79,6 +86,7 @@ export interface Provenance {
   likeness?: string;
   made_by?: string;
   made_on?: string; // a day such as 2026-11-24
+  parts?: Part[];
 }
 
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
@@ -136,7 +144,7 @@ function checkProvenance(provenance: Provenance): void {
 }
 
 /** Whether the avatar is nobody's likeness. */
-export function isSynthetic({ kind }: Provenance): boolean {
+export function isSynthetic({ kind }: { kind: string }): boolean {
   return kind === 'synthetic';
 }
 

@@ -1,4 +1,5 @@
 import { expect, test } from 'vitest';
+import type { Provenance } from '../../src/bundle/manifest.ts';
 import { rowsOf } from '../../src/ui/sheets/origin.ts';
 import { textOf } from '../../src/words/text.ts';
 
@@ -11,7 +12,7 @@ const FULL = {
   made_by: 'The museum',
   made_on: '2026-11-24',
 };
-const read = (provenance: typeof FULL | Omit<typeof FULL, 'likeness' | 'made_by' | 'made_on'>) =>
+const read = (provenance: Provenance) =>
   rowsOf(provenance).map(([name, value]) => [textOf({ key: name }, 'en'), textOf(value, 'en')]);
 
 test('all that a bundle states is told', () => {
@@ -42,4 +43,16 @@ test('a synthetic person is nobody, who need not agree', () => {
   const told = Object.fromEntries(read({ ...FULL, kind: 'synthetic' }));
   expect(told['Likeness of']).toBe('nobody: this person does not exist');
   expect(told).not.toHaveProperty('Consent');
+});
+
+test('of a head on the body of another it is told which part is recorded and which is made', () => {
+  const head = { name: 'head', kind: 'portrait', likeness: 'Jane Doe' } as const;
+  const body = { name: 'body', kind: 'synthetic', likeness: 'nobody: no such person exists' } as const;
+  const told = read({ ...FULL, kind: 'portrait, synthetic', parts: [head, body] });
+  expect(told.slice(0, 4)).toEqual([
+    ['Likeness of', 'Jane Doe'],
+    ['Consent', 'agreed in writing'],
+    ['The head', 'recorded: Jane Doe'],
+    ['The body', 'made: it shows nobody'],
+  ]);
 });

@@ -13,6 +13,21 @@ SYNTHETIC = "synthetic"
 
 
 @dataclass(frozen=True)
+class Part:
+    """What of an avatar comes from a source of its own.
+
+    Attributes:
+        name: `head` or `body`.
+        kind: Kind of that source's recordings; `synthetic` where nobody was recorded.
+        likeness: Whose likeness the part is.
+    """
+
+    name: str
+    kind: str
+    likeness: str
+
+
+@dataclass(frozen=True)
 class Provenance:
     """Origin of an avatar.
 
@@ -24,6 +39,8 @@ class Provenance:
         likeness: Whose likeness the avatar is.
         made_by: Who made the avatar.
         made_on: Day on which it was baked, such as 2026-11-24.
+        parts: What comes from whom, where the head of one person was put on the body of another;
+            empty elsewhere.
     """
 
     kind: str
@@ -33,6 +50,7 @@ class Provenance:
     likeness: str = NOT_STATED
     made_by: str = NOT_STATED
     made_on: str = NOT_STATED
+    parts: tuple[Part, ...] = ()
 
     @property
     def is_synthetic(self) -> bool:
@@ -51,12 +69,17 @@ REQUIRED = ("kind", "sources", "consent", "licence")
 The other entries are newer; they are written only where they are stated, so that older programs
 read what they know.
 """
-NEWER = {"likeness": NOT_STATED, "made_by": NOT_STATED, "made_on": NOT_STATED}
+NEWER: dict[str, Any] = {
+    "likeness": NOT_STATED,
+    "made_by": NOT_STATED,
+    "made_on": NOT_STATED,
+    "parts": [],
+}
 
 
 def provenance_to_json(provenance: Provenance) -> dict[str, Any]:
     """A provenance as a bundle stores it."""
-    return {key: v for key, v in plain(provenance).items() if key in REQUIRED or v != NOT_STATED}
+    return {key: v for key, v in plain(provenance).items() if v != NEWER.get(key)}
 
 
 def with_newer(value: Any) -> Any:

@@ -1,6 +1,6 @@
 """The file of a body on a skeleton (docs/bundle.md, body/skinned.safetensors)."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -105,6 +105,12 @@ class BakedSkinned:
     def rig(self) -> Rig:
         """The rig with its J joints at rest."""
         return self.info.rig(self.rig_joints)
+
+    def chosen(self, indices: np.ndarray) -> "BakedSkinned":
+        """The body with some of its Gaussians, by indices (M,) in the order they are to have."""
+        parts = {name: self.tensors[name].take(indices, axis) for name, axis in _AXES.items()}
+        info = replace(self.info, num_gaussians=len(indices), num_rest=0)
+        return replace(self, **parts, info=info)
 
     def to_bytes(self) -> bytes:
         """Content of the file `body/skinned.safetensors`.

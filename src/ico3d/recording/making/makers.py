@@ -3,6 +3,7 @@
 import contextlib
 import subprocess
 import threading
+from pathlib import Path
 from typing import cast
 
 from ico3d.creating.settings import QUALITIES, QualityName
@@ -22,9 +23,9 @@ LOG = "log.txt"
 class Makers:
     """The processes that make avatars, one at a time: there is but one machine."""
 
-    def __init__(self, people: People, worker: str = WORKER):
-        """Makes avatars of `people` by the module `worker`."""
-        self._people, self._worker = people, worker
+    def __init__(self, people: People, body: Path | None = None, worker: str = WORKER):
+        """Makes avatars of `people`, on a stand-in's `body` if given, by the module `worker`."""
+        self._people, self._body, self._worker = people, body, worker
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._lock = threading.Lock()
 
@@ -49,7 +50,7 @@ class Makers:
             folder.mkdir(exist_ok=True)
             write_progress(folder, begun(folder, cast(QualityName, quality)))
             with (folder / LOG).open("ab") as log:
-                words = [str(person.folder), quality]
+                words = [str(person.folder), quality, *([str(self._body)] if self._body else [])]
                 self._running[person.name] = start(self._worker, words, log)
 
     def progress(self, person: Person) -> Progress | None:

@@ -1,4 +1,4 @@
-"""The process in which an avatar is made: `python -m ico3d.recording.making.worker FOLDER QUALITY`.
+"""The process in which an avatar is made: `python -m …making.worker FOLDER QUALITY [BODY]`.
 
 It ends with the process that started it, and whoever starts it again goes on where it was.
 """
@@ -22,12 +22,13 @@ from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun
 
 
-def make(person: Person, quality: QualityName) -> Path:
+def make(person: Person, quality: QualityName, body: Path | None = None) -> Path:
     """Makes the avatar of a person, or goes on with it; the progress tells of it and of its end.
 
     Args:
         person: Whose it is.
         quality: How well it is to be made.
+        body: A whole person whose body it gets; None makes a head alone.
 
     Returns:
         The avatar.
@@ -47,6 +48,7 @@ def make(person: Person, quality: QualityName) -> Path:
             consent=about["consent"],
             licence=about["licence"],
             made_by=about["made_by"],
+            body=body,
         )
         create(settings, tell)
         write_atomic(places.avatar, lambda file: _copy(places.made, file))
@@ -94,9 +96,9 @@ def _copy(file: Path, to: Path) -> None:
 def main() -> int:
     """Makes an avatar; the exit status."""
     end_with_parent()
-    folder, quality = sys.argv[1:]
+    folder, quality, *body = sys.argv[1:]
     try:
-        make(Person(Path(folder)), cast(QualityName, quality))
+        make(Person(Path(folder)), cast(QualityName, quality), *map(Path, body))
     except Ico3dError as error:
         print(f"ico3d: {error}", file=sys.stderr)
         return 1

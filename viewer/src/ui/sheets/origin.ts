@@ -1,4 +1,4 @@
-import { isSynthetic, type Provenance } from '../../bundle/manifest.ts';
+import { isSynthetic, type Part, type Provenance } from '../../bundle/manifest.ts';
 import type { PageWords } from '../../words/page-words.ts';
 import { say, type Key, type Sentence } from '../../words/text.ts';
 import { byId } from '../elements.ts';
@@ -29,7 +29,13 @@ export function rowsOf(provenance: Provenance): [Key, Sentence][] {
         ['origin.likeness', told(provenance.likeness)],
         ['origin.consent', told(consent)],
       ];
-  return [...who, ['origin.sources', told(sources.join('; '))], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
+  return [...who, ...(provenance.parts ?? []).map(ofPart), ['origin.sources', told(sources.join('; '))], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
+}
+
+/** Whether the head, or the body, was recorded or made. */
+function ofPart(part: Part): [Key, Sentence] {
+  const made = isSynthetic(part);
+  return [part.name === 'head' ? 'origin.head' : 'origin.body', made ? say('origin.made') : say('origin.recorded', { whom: part.likeness })];
 }
 
 /** A text of whoever made the bundle, as it is. */

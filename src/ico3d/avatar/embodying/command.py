@@ -1,0 +1,42 @@
+"""The verb `ico3d embody`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from ico3d.bundle.packaged import NAME
+
+
+@dataclass(frozen=True)
+class Embody:
+    """Makes a whole person of a head alone: the body of another person stands in for their own.
+
+    The head is fitted to the body in place and size, the body's skin and hair take its colours.
+    The bundle says, and the page shows, which part is whose.
+
+    Attributes:
+        head: The avatar whose head, voice and persona are kept, NAME.ico3d.
+        out: The bundle to write.
+        body: A whole person on a skeleton; `demo` is the avatar of the package.
+    """
+
+    head: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    body: Path = Path(NAME)
+
+    def run(self) -> None:
+        """Fits, colours, writes and checks the bundle.
+
+        Raises:
+            Ico3dError: As for `embody`.
+        """
+        from rich.console import Console
+
+        from ico3d.avatar.embodying.embody import embody
+        from ico3d.bundle.format import Bundle
+
+        console = Console()
+        embody(Bundle.open(self.head), Bundle.open(self.body), self.out, console.print)
+        Bundle.open(self.out)
+        console.print(f"{self.out}: {self.out.stat().st_size / 1e6:.2f} MB.")
