@@ -177,6 +177,11 @@ class SimulatedPage:
         await self._socket.close()
         return self._socket.close_code, self._socket.close_reason or ""
 
+    async def vanish(self) -> None:
+        """Cuts the connection without a farewell, as a broken network does."""
+        self._socket.transport.abort()
+        await self.close()
+
     async def closed(self) -> int | None:
         """Waits until the server closes the connection; returns the close code."""
         await self._socket.wait_closed()
