@@ -10,7 +10,7 @@ from ico3d.errors import SettingsError
 
 WARM = 0.25  # share of a run that is not judged: caches fill, the memory's pools grow
 PER_HOUR = {"megabytes": 10.0, "descriptors": 2.0, "tasks": 10.0}
-"""How fast each may rise; a session that is never taken down is worth some 100 tasks."""
+"""How fast each may rise; a session that is never taken down is worth some 43 tasks."""
 FEWEST = 20  # rows to be judged
 
 

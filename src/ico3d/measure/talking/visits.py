@@ -86,16 +86,18 @@ async def ask(page: SimulatedPage) -> int:
 async def come_and_go(
     url: str, random: Random, going_on: Callable[[], bool], came: Callable[[str], None]
 ) -> None:
-    """One visit after the other, until `going_on` says no.
+    """One visit after the other, each kind once in a round, until `going_on` says no.
 
     Args:
         url: Address of the server.
-        random: Chooses the visits; every second visitor has an open microphone.
+        random: Draws the order of the visits; every second visitor has an open microphone.
         going_on: Asked before each visit.
         came: Receives the name of each visit that went well, of others the name and the error.
     """
+    due: list[Visit] = []
     while going_on():
-        visit = random.choice(VISITS)
+        due = due or random.sample(VISITS, len(VISITS))
+        visit = due.pop()
         try:
             await visit(url, random.random() < 0.5)
             came(visit.__name__)
