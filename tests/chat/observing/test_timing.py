@@ -1,5 +1,6 @@
 """Times of a turn, on a clock that the test sets; figures and the log."""
 
+import asyncio
 import json
 from datetime import UTC, datetime
 
@@ -163,6 +164,18 @@ def figures(monitor):
         for family in text_string_to_metric_families(text)
         for sample in family.samples
     }
+
+
+async def test_the_tasks_of_a_loop_are_counted():
+    monitor = Monitor()
+    assert figures(monitor)["ico3d_tasks",] == 0
+    monitor.watch(asyncio.get_running_loop())
+    before = figures(monitor)["ico3d_tasks",]
+    task = asyncio.create_task(asyncio.sleep(60))
+    assert figures(monitor)["ico3d_tasks",] == before + 1
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    assert figures(monitor)["ico3d_tasks",] == before
 
 
 async def test_turns_become_figures_and_lines(watched, tmp_path):

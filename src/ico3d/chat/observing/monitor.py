@@ -4,6 +4,7 @@ They never contain words of visitors or ids of sessions; with an id, a conversat
 over.
 """
 
+import asyncio
 import itertools
 import json
 from collections.abc import Callable
@@ -90,6 +91,11 @@ class Monitor:
         self._sessions = Gauge("ico3d_sessions", "Open sessions.", registry=registry)
         self.connections = Gauge("ico3d_connections", "Open connections.", registry=registry)
         self.waiting = Gauge("ico3d_waiting", "Visitors in the queue.", registry=registry)
+        self._tasks = Gauge("ico3d_tasks", "Tasks of the event loop.", registry=registry)
+
+    def watch(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Counts the tasks of an event loop from now on: a task that nobody ends is a leak."""
+        self._tasks.set_function(lambda: len(asyncio.all_tasks(loop)))
 
     def visitor(self) -> "Visitor":
         """Counts a new session."""

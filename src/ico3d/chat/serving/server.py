@@ -86,6 +86,8 @@ def make_app(
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         gc.freeze()  # what stays need not be looked at when a session's memory is freed
+        if sessions is not None:
+            sessions.monitor.watch(asyncio.get_running_loop())
         yield
         if sessions is not None:
             await sessions.close_all()

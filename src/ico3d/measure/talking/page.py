@@ -93,8 +93,10 @@ class SimulatedPage:
         self._sound = np.zeros(0, np.int16)  # still to be said
         self._sample = 0
         self._opened = time.monotonic()
-        jobs = [self._read(), self._report(), *([self._record()] if microphone else [])]
-        self._tasks = [asyncio.create_task(job) for job in jobs]
+        self.lag = 0.0
+        """Seconds that it takes to read a message."""
+        self._microphone = microphone
+        self._tasks = self._work()
 
     async def send(self, message: ClientMessage) -> None:
         """Sends a message."""
@@ -171,16 +173,41 @@ class SimulatedPage:
 
     async def close(self) -> tuple[int | None, str]:
         """Ends the connection; returns the close code and reason."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._rest()
         await self._socket.close()
         return self._socket.close_code, self._socket.close_reason or ""
+
+    async def vanish(self) -> None:
+        """Cuts the connection without a farewell, as a broken network does."""
+        self._socket.transport.abort()
+        await self.close()
+
+    async def stall(self, seconds: float) -> None:
+        """Neither reads nor sends for a while, like a suspended machine: not even pings."""
+        await self._rest()
+        self._socket.transport.pause_reading()
+        await asyncio.sleep(seconds)
+        self._socket.transport.resume_reading()
+        self._tasks = self._work()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the connection has ended."""
+        return self._socket.close_code is not None
 
     async def closed(self) -> int | None:
         """Waits until the server closes the connection; returns the close code."""
         await self._socket.wait_closed()
         return self._socket.close_code
+
+    def _work(self) -> list[asyncio.Task]:
+        jobs = [self._read(), self._report(), *([self._record()] if self._microphone else [])]
+        return [asyncio.create_task(job) for job in jobs]
+
+    async def _rest(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _read(self) -> None:
         with contextlib.suppress(ConnectionClosed):
@@ -190,6 +217,8 @@ class SimulatedPage:
                 self.player.take(message, now)
                 self.log.append((now, message))
                 self._arrived.set()
+                if self.lag:
+                    await asyncio.sleep(self.lag)
 
     async def _report(self) -> None:
         with contextlib.suppress(ConnectionClosed):
@@ -227,7 +256,8 @@ async def open_page(
         The page, and the server's welcome.
     """
     address = url.replace("http", "ws", 1).rstrip("/") + "/ws"
-    socket = await connect(address, max_size=protocol.MAX_BINARY_FRAME)
+    # browsers send no pings
+    socket = await connect(address, max_size=protocol.MAX_BINARY_FRAME, ping_interval=None)
     page = SimulatedPage(socket, microphone)
     await page.send(Hello(protocol.VERSION, session, last_index))
     _, welcome = await page.wait(Welcome)

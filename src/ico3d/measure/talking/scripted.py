@@ -5,14 +5,15 @@ machines where the real services are slow or missing.
 """
 
 import asyncio
-import functools
 import itertools
-from collections.abc import AsyncGenerator, Callable
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import AsyncGenerator, Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from typing import Literal
 
 import numpy as np
 from pipecat.frames.frames import (
+    DataFrame,
     Frame,
     LLMContextFrame,
     LLMFullResponseEndFrame,
@@ -33,6 +34,10 @@ from ico3d.chat.services.provider import Context, Provider
 from ico3d.chat.wire.protocol import SPEECH_RATE
 
 SLOWEST = 10.0  # s that pipecat waits for words or for sound
+NEVER = 3600.0  # s for which a service that hangs says nothing
+
+Fault = Literal["language dies", "language hangs", "voice dies", "voice hangs"]
+""""dies" breaks off halfway through the answer or the clause, "hangs" stays silent from there."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,7 @@ class Script:
         seconds: Duration of each clause's sound in seconds.
         pitch: Frequency of the voice's tone, Hz.
         apart: Hz by which the tone rises from one session to the next.
+        faults: What goes wrong with the answer to a question, by the question's text.
     """
 
     recognition: float = 0.1
@@ -58,6 +64,7 @@ class Script:
     seconds: float = 2.0
     pitch: float = 220.0
     apart: float = 0.0
+    faults: Mapping[str, Fault] = field(default_factory=dict)
 
     def delay(self) -> float:
         """Sum of the three delays in seconds."""
@@ -97,6 +104,21 @@ class Recognition(STTService):
         await self.push_frame(words)
 
 
+class BrokenError(Exception):
+    """A service broke off, as its script says."""
+
+
+@dataclass
+class FaultyFrame(DataFrame):
+    """Tells the voice what goes wrong with the answer that follows.
+
+    Attributes:
+        fault: What goes wrong; None for nothing.
+    """
+
+    fault: Fault | None = None
+
+
 class Language(FrameProcessor):
     """A language model that gives the same answer to every question, word by word."""
 
@@ -111,11 +133,22 @@ class Language(FrameProcessor):
         if not isinstance(frame, LLMContextFrame):
             await self.push_frame(frame, direction)
             return
+        fault = self._script.faults.get(asked(frame))
+        await self.push_frame(FaultyFrame(fault))
         await self.push_frame(LLMFullResponseStartFrame())
         await asyncio.sleep(self._script.language)
-        for word in self._script.answer.split():
-            await self.push_frame(LLMTextFrame(word + " "))
+        try:
+            await self._answer(fault)
+        except BrokenError as error:
+            await self.push_error(str(error), exception=error)
         await self.push_frame(LLMFullResponseEndFrame())
+
+    async def _answer(self, fault: Fault | None) -> None:
+        words = self._script.answer.split()
+        for place, word in enumerate(words):
+            if 2 * place >= len(words):
+                await fail(fault, "language")
+            await self.push_frame(LLMTextFrame(word + " "))
 
 
 class Voice(TTSService):
@@ -131,15 +164,46 @@ class Voice(TTSService):
             settings=TTSSettings(model=None, voice="scripted", language=None),
         )
         self._script = script
+        self._fault: Fault | None = None
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Learns what goes wrong with the next answer."""
+        if isinstance(frame, FaultyFrame):
+            self._fault = frame.fault
+        await super().process_frame(frame, direction)
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields the sound of a clause in one frame."""
+        """Yields the sound of a clause in one frame, or the half of it before a fault."""
         await asyncio.sleep(self._script.voice)
         sound = tone(self._script.pitch, self._script.seconds)
+        if self._fault in ("voice dies", "voice hangs"):
+            half = sound[: len(sound) // 2].tobytes()
+            yield TTSAudioRawFrame(half, SPEECH_RATE, 1, context_id=context_id)
+            await fail(self._fault, "voice")
         yield TTSAudioRawFrame(sound.tobytes(), SPEECH_RATE, 1, context_id=context_id)
 
 
-@functools.lru_cache(maxsize=256)
+async def fail(fault: Fault | None, service: str) -> None:
+    """Lets a service fail, if the fault is its own.
+
+    Raises:
+        BrokenError: If the service dies.
+    """
+    if fault == f"{service} hangs":
+        await asyncio.sleep(NEVER)
+    if fault == f"{service} dies":
+        raise BrokenError("the connection broke off")
+
+
+def asked(frame: LLMContextFrame) -> str:
+    """The question that a language model is to answer; empty if there is none."""
+    for message in reversed(frame.context.get_messages()):
+        if isinstance(message, dict) and message.get("role") == "user":
+            return str(message.get("content", ""))
+    return ""
+
+
+@lru_cache(maxsize=256)
 def tone(pitch: float, seconds: float) -> np.ndarray:
     """A tone of `pitch` Hz, (S,) int16 at 24 kHz; the same array for the same tone."""
     times = np.arange(int(seconds * SPEECH_RATE)) / SPEECH_RATE
