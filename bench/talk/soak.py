@@ -104,7 +104,7 @@ class Soak:
             table.flush()
             return row
 
-        await note()
+        row = await note()
         randoms = [Random(1000 * self.seed + n) for n in range(self.visitors)]
         tasks = [come_and_go(server.url, random, going_on, count) for random in randoms]
         visitors = asyncio.gather(*tasks)
