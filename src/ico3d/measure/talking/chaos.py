@@ -192,7 +192,9 @@ async def _crowd(_: Case, stage: Stage, page: SimulatedPage, outcome: Outcome) -
     counted = {"talk": 1, "wait": 0}
     async with AsyncExitStack() as stack:
         while True:
-            socket = await stack.enter_async_context(connect(address, ping_interval=None))
+            # Nobody reads what those who wait are told: without a limit it holds up no farewell.
+            line = connect(address, ping_interval=None, max_queue=None)
+            socket = await stack.enter_async_context(line)
             await socket.send(encode(Hello(VERSION, None, -1)))
             first = decode_server(await asyncio.wait_for(socket.recv(), PATIENCE))
             if isinstance(first, Error):
