@@ -1,0 +1,106 @@
+"""How far a body's surface moves at rest, from the build it was recorded in to another one.
+
+The file `builds.safetensors` (scripts/make_builds.py) says it for points of MakeHuman's body. They
+are laid upon any rig of that kind, and what lies around them moves with those nearest to it.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from safetensors import safe_open
+from scipy.spatial import cKDTree
+
+from ico3d.errors import BundleError
+from ico3d.rig.rig import Rig
+
+BuildName = Literal["slender", "medium", "sturdy"]
+RECORDED: BuildName = "medium"
+"""The build of a body as it was recorded."""
+DATA = Path(__file__).parents[2] / "data" / "builds.safetensors"
+UNIT = 1e-4
+"""Metres per unit of lengths in the file."""
+NEAREST = 24
+"""Points of the file that move a place: their weights fall to 0 at the farthest of them."""
+SIDES = (".L", ".R")
+"""Ends of the names of joints of one side."""
+STEP = 0.01
+"""Metres over which changes of a move are measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A change of build on one rig.
+
+    Attributes:
+        points: (A, 3) places at rest on the surface of the body, metres.
+        moves: (A, 3) how far they move, metres.
+    """
+
+    points: np.ndarray
+    moves: np.ndarray
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """(P, 3) metres by which places (P, 3) at rest move."""
+        away, near = self._tree.query(places, NEAREST)  # (P, NEAREST)
+        share = (1 - np.square(away / away[:, -1:])).clip(1e-9) ** 3
+        share /= share.sum(1, keepdims=True)
+        return np.einsum("pk,pkd->pd", share, self.moves[near])
+
+    def gradients(self, places: np.ndarray) -> np.ndarray:
+        """(P, 3, 3) what the change does about places (P, 3): the derivative of where they go."""
+        steps = STEP * np.eye(3)
+        slopes = [(self.at(places + s) - self.at(places - s)) / (2 * STEP) for s in steps]
+        return np.eye(3) + np.stack(slopes, -1)  # (P, 3, 3): row of a move, column of a step
+
+
+def change_to(build: BuildName, rig: Rig) -> Change:
+    """The change from the recorded build to another one.
+
+    Args:
+        build: Which one, other than `RECORDED`.
+        rig: The body's.
+
+    Raises:
+        BundleError: If the rig is not MakeHuman's, as `ico3d capture pose` fits it.
+    """
+    with safe_open(DATA, "numpy") as content:
+        about = json.loads(content.metadata()["builds"])
+        tensors = {name: content.get_tensor(name) for name in content.keys()}
+    lacking = [name for name in about["names"] if name not in rig.names]
+    if lacking:
+        raise BundleError(
+            f"the body's skeleton has no joint '{lacking[0]}': only bodies on MakeHuman's skeleton "
+            "(ico3d capture pose) come in other builds than their own."
+        )
+    names = about["names"]
+    rest, points = (tensors[part] * UNIT for part in ("rest", "points"))
+    places = rig.joints[[rig.names.index(name) for name in names]]  # (J, 3)
+    tall = [at[names.index("head"), 1] - at[names.index("foot.L"), 1] for at in (places, rest)]
+    size = float(tall[0] / tall[1])
+    weights = tensors["weights"] / tensors["weights"].sum(1, keepdims=True)  # (A, 4)
+    weights = np.concatenate([weights, weights])
+    joints = np.concatenate([tensors["joints"], _other_side(names)[tensors["joints"]]])
+    shifts = np.einsum("ak,akd->ad", weights, (places - size * rest)[joints])
+    moves = tensors["moves"][about["builds"].index(build)] * (UNIT * size)
+    return Change(size * _both_sides(points) + shifts, _both_sides(moves))
+
+
+def _both_sides(half: np.ndarray) -> np.ndarray:
+    """(2·A, 3) what holds on the left (A, 3), and its mirror image."""
+    return np.concatenate([half, half * [-1, 1, 1]])
+
+
+def _other_side(names: list[str]) -> np.ndarray:
+    """(J,) index of each joint's mirror image: names end in .L and .R."""
+    swapped = [
+        name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name[-2:] in SIDES else name for name in names
+    ]
+    return np.array([names.index(name) for name in swapped])
