@@ -28,8 +28,8 @@ from ico3d.capture.posing.model.template import DROPPED, GENDERS, RACES
 from ico3d.rig.binding import Binding
 
 BUILDS = {
-    "slender": {"averagemuscle-minweight": 0.85},
-    "sturdy": {"averagemuscle-maxweight": 1.3, "maxmuscle-averageweight": 0.3},
+    "slender": {"averagemuscle-minweight": 1.0},
+    "sturdy": {"averagemuscle-maxweight": 1.6, "maxmuscle-averageweight": 0.4},
 }
 """By build, targets of `universal-GENDER-young-…`, and how much of what they change is taken."""
 POINTS = 1400

@@ -27,8 +27,6 @@ NEAREST = 24
 """Points of the file that move a place: their weights fall to 0 at the farthest of them."""
 SIDES = (".L", ".R")
 """Ends of the names of joints of one side."""
-STEP = 0.01
-"""Metres over which changes of a move are measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +45,25 @@ class Change:
     def _tree(self) -> cKDTree:
         return cKDTree(self.points)
 
-    def at(self, places: np.ndarray) -> np.ndarray:
-        """(P, 3) metres by which places (P, 3) at rest move."""
-        away, near = self._tree.query(places, NEAREST)  # (P, NEAREST)
-        share = (1 - np.square(away / away[:, -1:])).clip(1e-9) ** 3
-        share /= share.sum(1, keepdims=True)
-        return np.einsum("pk,pkd->pd", share, self.moves[near])
+    def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the change does at places (P, 3) at rest.
 
-    def gradients(self, places: np.ndarray) -> np.ndarray:
-        """(P, 3, 3) what the change does about places (P, 3): the derivative of where they go."""
-        steps = STEP * np.eye(3)
-        slopes = [(self.at(places + s) - self.at(places - s)) / (2 * STEP) for s in steps]
-        return np.eye(3) + np.stack(slopes, -1)  # (P, 3, 3): row of a move, column of a step
+        Returns:
+            (P, 3) metres by which they move, and (P, 3, 3) the derivative of where they go.
+        """
+        away, near = self._tree.query(places, NEAREST)  # (P, NEAREST)
+        reach = np.square(away[:, -1:])  # (P, 1)
+        apart = places[:, None] - self.points[near]  # (P, NEAREST, 3)
+        inside = 1 - np.square(away) / reach  # (P, NEAREST)
+        share = inside**3
+        ratio = (1 - inside)[..., None] / reach[..., None]  # (P, NEAREST, 1)
+        slope = -2 * (apart / reach[..., None] - ratio * apart[:, -1:])  # of `inside`
+        slope *= 3 * np.square(inside)[..., None]  # of `share`
+        total = share.sum(1)[:, None]  # (P, 1)
+        moves = self.moves[near]  # (P, NEAREST, 3)
+        found = np.einsum("pk,pkd->pd", share, moves) / total
+        turns = np.einsum("pka,pkb->pab", moves - found[:, None], slope) / total[..., None]
+        return found, np.eye(3) + turns
 
 
 def change_to(build: BuildName, rig: Rig) -> Change:

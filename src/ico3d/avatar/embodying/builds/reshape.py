@@ -31,7 +31,7 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
         return body
     change = change_to(build, body.rig)
     means = body.means.astype(np.float64)
-    moves, slopes = change.at(means), change.gradients(means)  # (N, 3), (N, 3, 3)
+    moves, slopes = change.at(means)  # (N, 3), (N, 3, 3)
     touched = np.abs(slopes - np.eye(3)).max((1, 2)) > 0
     parts = _stretched(body, slopes) if touched.any() else {}
     kept = {
@@ -79,7 +79,7 @@ def _lamp(body: BakedSkinned, change: Change):
     if body.lamp is None:
         return None
     points = body.lamp.caster_points * POINT_UNIT
-    moved = np.rint((points + change.at(points)) / POINT_UNIT).astype(np.int16)
+    moved = np.rint((points + change.at(points)[0]) / POINT_UNIT).astype(np.int16)
     return replace(body.lamp, caster_points=moved)
 
 
