@@ -18,7 +18,7 @@ RECORDED: OutfitName = "recorded"
 """The clothes of a body as they were recorded."""
 OUTFITS: dict[OutfitName, tuple[tuple[float, float, float], ...]] = {
     "navy": ((0.08, 0.11, 0.21), (0.36, 0.32, 0.25), (0.20, 0.13, 0.09)),
-    "wine": ((0.30, 0.07, 0.10), (0.12, 0.12, 0.13), (0.07, 0.06, 0.06)),
+    "wine": ((0.21, 0.05, 0.075), (0.12, 0.12, 0.13), (0.07, 0.06, 0.06)),
 }
 """By outfit, the median display colours r, g, b of jumper, trousers and shoes in the body's light.
 """

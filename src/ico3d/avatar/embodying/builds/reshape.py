@@ -9,6 +9,12 @@ from ico3d.bundle.skinned.baked import QUAT_UNIT, BakedSkinned
 from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.rig.quaternions import from_matrix, normalized, to_matrix
 
+STRETCH = 1.3
+"""Most by which a Gaussian grows or shrinks in any direction.
+
+Surfaces stay within it; inside of an arm, where front and back move apart, what lies there would
+be drawn out until it shows outside.
+"""
 NORMAL_UNIT = 127
 SHAPE_UNIT = 127
 """Largest whole number of normals, and of residual shapes."""
@@ -32,6 +38,7 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
     change = change_to(build, body.rig)
     means = body.means.astype(np.float64)
     moves, slopes = change.at(means)  # (N, 3), (N, 3, 3)
+    slopes = _bounded(slopes)
     touched = np.abs(slopes - np.eye(3)).max((1, 2)) > 0
     parts = _stretched(body, slopes) if touched.any() else {}
     kept = {
@@ -45,6 +52,14 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
     return replace(
         body, means=(means + moves).astype(np.float32), **kept, info=info, lamp=_lamp(body, change)
     )
+
+
+def _bounded(slopes: np.ndarray) -> np.ndarray:
+    """The same changes (N, 3, 3), none of which stretches or squeezes by more than `STRETCH`."""
+    axes, lengths, turns = np.linalg.svd(slopes)
+    bounded = (axes * lengths.clip(1 / STRETCH, STRETCH)[:, None]) @ turns
+    inside = (lengths <= STRETCH).all(1) & (lengths >= 1 / STRETCH).all(1)
+    return np.where(inside[:, None, None], slopes, bounded)
 
 
 def _stretched(body: BakedSkinned, slopes: np.ndarray) -> dict[str, np.ndarray]:
