@@ -1,7 +1,7 @@
 """Which Gaussians of a body are its jumper, its trousers and its shoes."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ico3d.avatar.embodying.surfaces import Surfaces, features, legs, main_joints
 from ico3d.bundle.skinned.baked import BakedSkinned
@@ -32,7 +32,7 @@ def garments_of(body: BakedSkinned, cast: Cast, surfaces: Surfaces) -> np.ndarra
         (N, 3) in [0, 1], how much each Gaussian is of `GARMENTS`; skin and hair are of none.
     """
     mainly, colors = main_joints(body), features(body.color_logits)
-    _, near = cKDTree(body.means).query(body.means, min(NEIGHBOURS, len(mainly)))  # (N, ≤16)
+    _, near = KDTree(body.means).query(body.means, min(NEIGHBOURS, len(mainly)))  # (N, ≤16)
     clothes = _clothes(surfaces, np.isin(mainly, cast.joints["spine"]), body, near)
     sure = (clothes > 0.9) & (body.opacities > 127)
     leg = np.isin(mainly, legs(cast))

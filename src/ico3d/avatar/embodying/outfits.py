@@ -1,21 +1,18 @@
 """Outfits: other colours of jumper, trousers and shoes, whose stitches, folds and light stay."""
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
 from ico3d.avatar.embodying.drawn_colors import logits
 from ico3d.avatar.embodying.garments import GARMENTS, garments_of
+from ico3d.avatar.embodying.look import AS_RECORDED, OutfitName
 from ico3d.avatar.embodying.surfaces import Surfaces
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.posing import posed, recorded_pose
 from ico3d.errors import BundleError
 from ico3d.motion.roles import Cast
 
-OutfitName = Literal["recorded", "navy", "wine"]
-RECORDED: OutfitName = "recorded"
-"""The clothes of a body as they were recorded."""
 OUTFITS: dict[OutfitName, tuple[tuple[float, float, float], ...]] = {
     "navy": ((0.08, 0.11, 0.21), (0.36, 0.32, 0.25), (0.20, 0.13, 0.09)),
     "wine": ((0.21, 0.05, 0.075), (0.12, 0.12, 0.13), (0.07, 0.06, 0.06)),
@@ -41,7 +38,7 @@ def dressed(body: BakedSkinned, cast: Cast, surfaces: Surfaces, outfit: OutfitNa
     Raises:
         BundleError: If jumper, trousers or shoes are not found.
     """
-    if outfit == RECORDED:
+    if outfit == AS_RECORDED:
         return body
     share = garments_of(body, cast, surfaces)  # (N, 3)
     shown = logits(posed(body, recorded_pose(body, 0)).rgb)  # (N, 3)

@@ -8,23 +8,24 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from safetensors import safe_open
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
+from ico3d.avatar.embodying.builds.names import BuildName
 from ico3d.errors import BundleError
 from ico3d.rig.rig import Rig
 
-BuildName = Literal["slender", "medium", "sturdy"]
-RECORDED: BuildName = "medium"
-"""The build of a body as it was recorded."""
 DATA = Path(__file__).parents[2] / "data" / "builds.safetensors"
 UNIT = 1e-4
 """Metres per unit of lengths in the file."""
 NEAREST = 24
 """Points of the file that move a place: their weights fall to 0 at the farthest of them."""
+HIPS = ("root", "spine05", "upperleg01.L")
+"""Joints on which the left half of the hips hangs."""
+WIDEST = 0.8
+"""Share of the points on the hips that are nearer to their middle than those that say how wide."""
 SIDES = (".L", ".R")
 """Ends of the names of joints of one side."""
 
@@ -36,14 +37,16 @@ class Change:
     Attributes:
         points: (A, 3) places at rest on the surface of the body, metres.
         moves: (A, 3) how far they move, metres.
+        width: How many times as wide the hips become.
     """
 
     points: np.ndarray
     moves: np.ndarray
+    width: float
 
     @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.points)
+    def _tree(self) -> KDTree:
+        return KDTree(self.points)
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the change does at places (P, 3) at rest.
@@ -70,7 +73,7 @@ def change_to(build: BuildName, rig: Rig) -> Change:
     """The change from the recorded build to another one.
 
     Args:
-        build: Which one, other than `RECORDED`.
+        build: Which one, other than the recorded one.
         rig: The body's.
 
     Raises:
@@ -78,7 +81,8 @@ def change_to(build: BuildName, rig: Rig) -> Change:
     """
     with safe_open(DATA, "numpy") as content:
         about = json.loads(content.metadata()["builds"])
-        tensors = {name: content.get_tensor(name) for name in content.keys()}
+        names = content.keys()
+        tensors = {name: content.get_tensor(name) for name in names}
     lacking = [name for name in about["names"] if name not in rig.names]
     if lacking:
         raise BundleError(
@@ -91,11 +95,20 @@ def change_to(build: BuildName, rig: Rig) -> Change:
     tall = [at[names.index("head"), 1] - at[names.index("foot.L"), 1] for at in (places, rest)]
     size = float(tall[0] / tall[1])
     weights = tensors["weights"] / tensors["weights"].sum(1, keepdims=True)  # (A, 4)
-    weights = np.concatenate([weights, weights])
-    joints = np.concatenate([tensors["joints"], _other_side(names)[tensors["joints"]]])
-    shifts = np.einsum("ak,akd->ad", weights, (places - size * rest)[joints])
     moves = tensors["moves"][about["builds"].index(build)] * (UNIT * size)
-    return Change(size * _both_sides(points) + shifts, _both_sides(moves))
+    aside = np.where(_at_hips(names, tensors["joints"], weights), points[:, 0], 0.0)  # (A,)
+    wide = aside > np.quantile(aside[aside > 0], WIDEST)
+    width = 1 + moves[wide, 0].mean() / (size * aside[wide].mean())
+    both = np.concatenate([weights, weights])
+    joints = np.concatenate([tensors["joints"], _other_side(names)[tensors["joints"]]])
+    shifts = np.einsum("ak,akd->ad", both, (places - size * rest)[joints])
+    return Change(size * _both_sides(points) + shifts, _both_sides(moves), float(width))
+
+
+def _at_hips(names: list[str], joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(A,) bool: which points hang most on the joints of the hips."""
+    mainly = np.take_along_axis(joints, weights.argmax(1)[:, None], 1)[:, 0]
+    return np.isin(mainly, [names.index(name) for name in HIPS])
 
 
 def _both_sides(half: np.ndarray) -> np.ndarray:

@@ -1,12 +1,16 @@
 """Gives a baked body on a skeleton another build."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ico3d.avatar.embodying.builds.change import RECORDED, BuildName, Change, change_to
+from ico3d.avatar.embodying.builds.change import Change, change_to
+from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
 from ico3d.bundle.skinned.baked import QUAT_UNIT, BakedSkinned
-from ico3d.bundle.skinned.lamp import POINT_UNIT
+from ico3d.bundle.skinned.gestures import gesture_files
+from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
+from ico3d.motion.recorded.cut import Cut
 from ico3d.rig.quaternions import from_matrix, normalized, to_matrix
 
 STRETCH = 1.3
@@ -33,7 +37,7 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
     Raises:
         BundleError: If the body's skeleton is not MakeHuman's.
     """
-    if build == RECORDED:
+    if build == MEDIUM:
         return body
     change = change_to(build, body.rig)
     means = body.means.astype(np.float64)
@@ -54,12 +58,26 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
     )
 
 
+def gestures_in(body: BakedSkinned, build: BuildName, cuts: Sequence[Cut]) -> dict[str, bytes]:
+    """The file of gestures of a body in another build: arms hang, and hands pass, beside it.
+
+    Args:
+        body: The body in that build.
+        build: The build.
+        cuts: Gestures in the recording.
+
+    Returns:
+        Content of the file by its name.
+    """
+    return gesture_files(body, cuts, change_to(build, body.rig).width)
+
+
 def _bounded(slopes: np.ndarray) -> np.ndarray:
     """The same changes (N, 3, 3), none of which stretches or squeezes by more than `STRETCH`."""
     axes, lengths, turns = np.linalg.svd(slopes)
     bounded = (axes * lengths.clip(1 / STRETCH, STRETCH)[:, None]) @ turns
-    inside = (lengths <= STRETCH).all(1) & (lengths >= 1 / STRETCH).all(1)
-    return np.where(inside[:, None, None], slopes, bounded)
+    outside = np.abs(np.log(lengths)).max(1, keepdims=True)[..., None] > np.log(STRETCH)
+    return np.where(outside, bounded, slopes)
 
 
 def _stretched(body: BakedSkinned, slopes: np.ndarray) -> dict[str, np.ndarray]:
@@ -90,7 +108,7 @@ def _turned(body: BakedSkinned, slopes: np.ndarray) -> tuple[np.ndarray, np.ndar
     return shapes, scales.astype(np.float16)
 
 
-def _lamp(body: BakedSkinned, change: Change):
+def _lamp(body: BakedSkinned, change: Change) -> BakedLamp | None:
     if body.lamp is None:
         return None
     points = body.lamp.caster_points * POINT_UNIT
