@@ -27,7 +27,7 @@ from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, Bundle, coarse_firs
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import Loss, Manifest
 from ico3d.bundle.skinned.baked import BakedSkinned
-from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
+from ico3d.bundle.skinned.gestures import GESTURES
 from ico3d.bundle.skinned.info import SKINNED
 from ico3d.errors import BundleError, ModelError
 from ico3d.motion.roles import cast
@@ -231,8 +231,6 @@ def _gestures(bundle: Bundle, body: BakedSkinned, look: Look) -> dict[str, bytes
     """The file of gestures by its name, if the body has one."""
     if GESTURES not in bundle.manifest.files:
         return {}
-    recorded = bundle.read(GESTURES)
     if look.build == MEDIUM:
-        return {GESTURES: recorded}
-    assert bundle.skinned is not None
-    return gestures_in(body, look.build, gestures_from(recorded, bundle.skinned).cuts)
+        return {GESTURES: bundle.read(GESTURES)}
+    return gestures_in(body, look.build, bundle.cuts)

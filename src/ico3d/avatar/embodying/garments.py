@@ -5,13 +5,15 @@ from scipy.spatial import KDTree
 
 from ico3d.avatar.embodying.surfaces import Surfaces, features, legs, main_joints
 from ico3d.bundle.skinned.baked import BakedSkinned
-from ico3d.motion.roles import SIDES, Cast
+from ico3d.motion.roles import SIDES, Cast, arm_roles
 
 GARMENTS = ("jumper", "trousers", "shoes")
 NEIGHBOURS = 16
 """Gaussians about one that have a say in what it belongs to, itself among them."""
 MOST = 0.75
 """Share of them that decides against a Gaussian's own colour: stitches that shine are no skin."""
+SHAFT = 0.2
+"""How far up the shank shoes can reach."""
 FAINT = 0.1
 """A Gaussian that is less of clothes than this is none of them."""
 
@@ -32,18 +34,22 @@ def garments_of(body: BakedSkinned, cast: Cast, surfaces: Surfaces) -> np.ndarra
         (N, 3) in [0, 1], how much each Gaussian is of `GARMENTS`; skin and hair are of none.
     """
     mainly, colors = main_joints(body), features(body.color_logits)
-    _, near = KDTree(body.means).query(body.means, min(NEIGHBOURS, len(mainly)))  # (N, ≤16)
+    count = min(NEIGHBOURS, len(mainly))
+    near = KDTree(body.means).query(body.means, count)[1].reshape(-1, count)  # (N, ≤16)
     clothes = _clothes(surfaces, np.isin(mainly, cast.joints["spine"]), body, near)
+    clothes[surfaces.head | np.isin(mainly, _fingers(cast))] = 0
     sure = (clothes > 0.9) & (body.opacities > 127)
     leg = np.isin(mainly, legs(cast))
     lower, foot = (_below(cast, role)[mainly] for role in ("knee", "ankle"))
-    ankle = np.mean([cast.place(f"{side}_ankle")[1] for side in SIDES])
-    low = foot & (body.means[:, 1] < ankle)
-    shoe = foot & (body.means[:, 1] < (ankle + body.means[foot, 1].min(initial=ankle)) / 2)
+    ankle, knee = (np.mean([cast.place(f"{s}_{r}")[1] for s in SIDES]) for r in ("ankle", "knee"))
+    height = body.means[:, 1]
+    low = foot & (height < ankle)
+    shoe = foot & (height < (ankle + height[foot].min(initial=ankle)) / 2)
+    shaft = lower & (height < ankle + SHAFT * (knee - ankle))
     trunk = np.isin(mainly, [j for role in ("hips", "spine") for j in cast.joints[role]])
     at_hem = trunk | (leg & ~lower)
     known = (sure & ~leg & ~at_hem, sure & lower & ~foot, sure & low)
-    may = np.stack([~leg | at_hem, (leg | at_hem) & ~shoe, lower], 1)  # (N, 3)
+    may = np.stack([~leg | at_hem, (leg | at_hem) & ~shoe, shaft], 1)  # (N, 3)
     away = np.square(colors[:, None] - [_median(colors[part]) for part in known]).sum(2)
     away[~may] = np.inf
     votes = np.eye(len(GARMENTS))[away.argmin(1)]  # (N, 3)
@@ -66,8 +72,13 @@ def _clothes(
     weight = body.opacities[near] + 1.0  # (N, K)
     said = (clothes[near] * weight).sum(1) / weight.sum(1)  # (N,)
     clothes = np.where(said > MOST, np.maximum(clothes, said), clothes)
-    faint = (clothes < FAINT) | (said < 1 - MOST) | surfaces.head
-    return np.where(faint, 0.0, clothes)
+    return np.where((clothes < FAINT) | (said < 1 - MOST), 0.0, clothes)
+
+
+def _fingers(cast: Cast) -> list[int]:
+    """Joints of the fingers."""
+    roles = [role for side in SIDES for role in arm_roles(side)[4:]]
+    return [joint for role in roles for joint in cast.joints.get(role, ())]
 
 
 def _below(cast: Cast, role: str) -> np.ndarray:

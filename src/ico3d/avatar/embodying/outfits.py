@@ -46,8 +46,9 @@ def dressed(body: BakedSkinned, cast: Cast, surfaces: Surfaces, outfit: OutfitNa
     for part, color, name in zip(share.T, OUTFITS[outfit], GARMENTS, strict=True):
         own = (part > 0.9) & (body.opacities > 127)
         if own.sum() < LEAST:
+            verb = "is" if name == "jumper" else "are"
             raise BundleError(
-                f"no {name} are found on the body, so it has no outfit but its own (recorded)."
+                f"no {name} {verb} found on the body, so it has no outfit but its own (recorded)."
             )
         change += part[:, None] * (logits(np.array(color)) - np.median(shown[own], axis=0))
     return replace(body, color_logits=(body.color_logits + change).astype(np.float16))
