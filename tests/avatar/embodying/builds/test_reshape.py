@@ -57,9 +57,8 @@ def test_head_fingers_soles_and_skeleton_stay_bit_for_bit(body, builds, build):
     head = body.means[:, 1] > body.rig.joints[body.rig.names.index("head"), 1] + 0.03
     wrists = body.rig.joints[[body.rig.names.index(f"wrist.{side}") for side in "LR"]]
     hand = np.linalg.norm(body.means[:, None] - wrists, axis=2).min(1) > 0.08
-    kept = (_hangs_on(body, "finger") & hand) | (
-        _hangs_on(body, "head") & head
-    )  # but for hair on the back
+    kept = _hangs_on(body, "finger") & hand
+    kept |= _hangs_on(body, "head") & head  # but for hair on the back
     kept |= _hangs_on(body, "foot") & (body.means[:, 1] < body.rig.joints[:, 1].min() - 0.03)
     assert kept.sum() > 1000
     for name, tensor in body.tensors.items():
@@ -68,7 +67,8 @@ def test_head_fingers_soles_and_skeleton_stay_bit_for_bit(body, builds, build):
             assert same[kept].all(), (name, body.means[kept & ~same][:5])
         elif name != "caster_points":
             assert np.array_equal(other.tensors[name], tensor), name
-    assert BakedSkinned.from_bytes(other.to_bytes(), other.info).rig.names == body.rig.names
+    whole = replace(other.info, num_rest=0)
+    assert BakedSkinned.from_bytes(other.to_bytes(), whole).rig.names == body.rig.names
 
 
 @pytest.mark.parametrize("build", OTHERS)
