@@ -13,6 +13,7 @@ from typing import Any
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
 
+from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.server import add_page
 from ico3d.chat.serving.sites import Sites, add_tokens
@@ -290,7 +291,9 @@ async def _form(request: Request) -> dict[str, Any]:
     return form if isinstance(form, dict) else {}
 
 
-def open_room(folder: Path, host: str, tls: bool, body: Path | None = None) -> Room:
+def open_room(
+    folder: Path, host: str, tls: bool, body: Path | None = None, look: Look = UNCHANGED
+) -> Room:
     """What a server of the studio page shares.
 
     Args:
@@ -298,6 +301,9 @@ def open_room(folder: Path, host: str, tls: bool, body: Path | None = None) -> R
         host: Address to which it is bound.
         tls: Whether it serves by HTTPS.
         body: A whole person whose body the avatars get; None makes heads alone.
+        look: Build and outfit of that body.
     """
     people = People(folder)
-    return Room(people, Eye(), Makers(people, body), Talks(host, tls), defaultdict(asyncio.Lock))
+    return Room(
+        people, Eye(), Makers(people, body, look), Talks(host, tls), defaultdict(asyncio.Lock)
+    )
