@@ -1,5 +1,7 @@
 """Who has the floor, on a clock that only the test moves."""
 
+import time
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -148,3 +150,12 @@ def test_verdicts_alternate(pieces):
             assert talk.floor.is_paused == paused
             if verdict is Verdict.YIELD:
                 return
+
+
+def test_thousands_of_backchannels_hold_nobody_up():
+    said = "uh-huh, ok " * 360  # nearly as long as a page may send
+    begun = time.process_time()
+    assert phrases().are_backchannels(said)
+    assert not phrases().are_backchannels(f"{said} but")
+    assert not phrases().is_command("one " * 1000)
+    assert time.process_time() - begun < 0.5  # it took ten seconds, in the loop of all visitors

@@ -29,7 +29,8 @@ class Phrases:
     def is_command(self, text: str) -> bool:
         """Whether a text begins with a command."""
         words = plain(text).split()
-        return any(" ".join(words[:n]) in self.commands for n in range(1, len(words) + 1))
+        ends = range(1, min(len(words), longest(self.commands)) + 1)
+        return any(" ".join(words[:end]) in self.commands for end in ends)
 
 
 @cache
@@ -42,11 +43,18 @@ def phrases() -> Phrases:
 
 def covered(words: list[str], known: frozenset[str]) -> bool:
     """Whether a list of words can be divided into known phrases completely."""
-    reached = {0}
+    most, reached = longest(known), {0}
     for end in range(1, len(words) + 1):
-        if any(start in reached and " ".join(words[start:end]) in known for start in range(end)):
+        starts = range(max(0, end - most), end)
+        if any(start in reached and " ".join(words[start:end]) in known for start in starts):
             reached.add(end)
     return bool(words) and len(words) in reached
+
+
+@cache
+def longest(known: frozenset[str]) -> int:
+    """Number of words of the longest phrase."""
+    return max((len(phrase.split()) for phrase in known), default=0)
 
 
 def plain(text: str) -> str:
