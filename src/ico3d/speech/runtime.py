@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,8 @@ from ico3d.speech.silence import SilenceGate
 from ico3d.speech.stream import WindowStream
 
 _LARGE = 10**8  # bytes
+MOST_MEMORY = 1 << 30  # bytes that the graphs of bundles may take while they run, all together
+AT_ONCE = 30.0  # s of a whole sound, whose rows are computed together
 
 BEFORE, AFTER = 4, 3  # rows that the attention sees around each: [i − 4, i + 4)
 TOLD = "told"
@@ -50,10 +53,10 @@ class SpeechModel:
 
         Raises:
             MissingExtraError: If onnxruntime is not installed.
-            ModelError: If a file cannot be used, or the encoder is missing or has another feature
-                size.
+            ModelError: If a file cannot be used or takes more than `MOST_MEMORY`, or the encoder is
+                missing or has another feature size.
         """
-        self._model = _session(model, "speech.onnx")
+        self._model = _session(model, "speech.onnx", bounded=True)
         self._input = self._model.get_inputs()[0].name
         if self._input not in ("mel", "features"):
             raise ModelError(f"speech.onnx has the unknown input '{self._input}'.")
@@ -72,7 +75,7 @@ class SpeechModel:
         self.takes_phonemes = TOLD in [i.name for i in self._model.get_overridable_initializers()]
         self.silent_input = self._silence()
         silent = np.repeat(self.silent_input[None], BEFORE + 1 + AFTER, axis=0)
-        self.silent_expression = self.run(silent)[BEFORE]  # (32,)
+        self.silent_expression = self._tried(silent)[BEFORE]  # (32,)
 
     def expressions(self, samples: np.ndarray, rate: int) -> np.ndarray:
         """Expression values of a whole sound; silence is assumed before and after.
@@ -85,7 +88,9 @@ class SpeechModel:
             (T, 32) float32; row i belongs to time i/25 s, T ≥ ⌊25·seconds⌋ + 1.
         """
         stream = StreamingExpressions(self, rate)
-        return np.concatenate([stream.push(samples), stream.finish()])
+        size = round(AT_ONCE * rate)
+        pieces = (samples[at : at + size] for at in range(0, len(samples), size))
+        return np.concatenate([*map(stream.push, pieces), stream.finish()])
 
     def stream(self, rate: int) -> RowStream:
         """A stream that turns a new sound of `rate` samples per second into rows for `run`."""
@@ -102,6 +107,19 @@ class SpeechModel:
         if told is not None and self.takes_phonemes:
             given[TOLD] = told
         return self._model.run(None, given)[0]
+
+    def _tried(self, rows: np.ndarray) -> np.ndarray:
+        """The first run, which shows whether a stranger's graph can be run at all."""
+        try:
+            found = self.run(rows)
+        except Exception as error:  # onnxruntime's have no common class
+            why = str(error).strip().rstrip(".")[:200]
+            raise ModelError(
+                f"speech.onnx cannot be run within {MOST_MEMORY >> 20} MiB: {why}."
+            ) from None
+        if found.shape != (len(rows), SPEECH_SIZE):
+            raise ModelError(f"speech.onnx gives {found.shape[-1]} values, not {SPEECH_SIZE}.")
+        return found
 
     def _silence(self) -> np.ndarray:
         """The row that is amid long silence."""
@@ -278,7 +296,9 @@ def _is_large(file: bytes | Path | str) -> bool:
     return size > _LARGE
 
 
-def _session(model: bytes | Path | str, what: str, heavy: bool = False) -> Any:
+def _session(
+    model: bytes | Path | str, what: str, heavy: bool = False, bounded: bool = False
+) -> Any:
     """An onnxruntime session.
 
     Args:
@@ -286,6 +306,8 @@ def _session(model: bytes | Path | str, what: str, heavy: bool = False) -> Any:
         what: What errors call it.
         heavy: Whether other threads or a GPU are worth a hand-over; a row of a light model takes
             less than that.
+        bounded: Whether the file may be a stranger's, so that it gets no more than `MOST_MEMORY`:
+            a graph of a few hundred bytes can double its data at each step.
     """
     try:
         import onnxruntime
@@ -294,11 +316,30 @@ def _session(model: bytes | Path | str, what: str, heavy: bool = False) -> Any:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 0 if heavy else 1
     options.log_severity_level = 3
+    # constants are folded while a file is opened, outside of the bound
+    left_out = ["ConstantFolding"] if bounded else []
+    if bounded:
+        _bound_memory()
+        options.add_session_config_entry("session.use_env_allocators", "1")
     source = model if isinstance(model, bytes) else str(model)
     wanted = ("CUDAExecutionProvider", "CPUExecutionProvider")[0 if heavy else 1 :]
     providers = [name for name in wanted if name in onnxruntime.get_available_providers()]
     try:
-        return onnxruntime.InferenceSession(source, options, providers=providers)
+        return onnxruntime.InferenceSession(
+            source, options, providers=providers, disabled_optimizers=left_out
+        )
     except Exception as error:
         why = str(error).strip().rstrip(".")
         raise ModelError(f"{what} is no usable ONNX model: {why}.") from None
+
+
+@cache
+def _bound_memory() -> None:
+    """Gives onnxruntime, once in a process, the bounded memory that sessions may ask for."""
+    import onnxruntime
+
+    as_asked = {"arena_extend_strategy": 1, "initial_chunk_size_bytes": -1}
+    bounds = {"max_mem": MOST_MEMORY, **as_asked, "max_dead_bytes_per_chunk": -1}
+    kind = onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR
+    memory = onnxruntime.OrtMemoryInfo("Cpu", kind, 0, onnxruntime.OrtMemType.DEFAULT)
+    onnxruntime.create_and_register_allocator(memory, onnxruntime.OrtArenaCfg(bounds))
