@@ -1,5 +1,7 @@
 """Whisper: a real model file through faster-whisper and pipecat, with random weights."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -143,6 +145,26 @@ def test_a_window_is_as_long_as_needed_and_its_filling_is_silence(filled, encode
     assert (found[:, filled:] == given[:, :filled].min(initial=0.0)).all()
     np.testing.assert_array_equal(window, given)
     np.testing.assert_array_equal(shortened(window[None])[0], found)
+
+
+@pytest.mark.parametrize(
+    ("text", "twice"),
+    [
+        ("So I said, so I said, well.", True),
+        ("It's fine. It's fine.", False),
+        ("one two three four one two three", False),
+        ("Thank you, all of you. thank you all of you", True),
+        ("a" + "'" * 400 + "b", False),  # a pattern took longer than anybody lives
+        ("a' " * 500, True),
+        (" ".join(map(str, range(500))), False),
+    ],
+)
+def test_what_is_said_twice_is_found_at_once(text, twice):
+    from ico3d.chat.services.recognition.short_whisper import repeats_itself
+
+    begun = time.process_time()
+    assert repeats_itself(text) is twice
+    assert time.process_time() - begun < 1
 
 
 def test_a_core_is_left_to_others(german, monkeypatch):

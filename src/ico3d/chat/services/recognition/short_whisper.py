@@ -18,8 +18,8 @@ FRAMES = 100  # of the spectrogram in a second
 SHORTEST = 10 * FRAMES  # of a window
 MARGIN = 2 * FRAMES  # that stay behind the sound, from which the model knows that it has ended
 MOST_REPETITIVE, LEAST_LIKELY = 2.4, -1.0  # Whisper's own limits: compression, mean log-probability
-_TWICE = re.compile(r"\b((?:[\w'’]+\W+){2,}[\w'’]+)\W+\1", re.IGNORECASE)
-"""Three words or more that are said twice in a row."""
+_WORD = re.compile(r"[\w'’]+")
+LEAST_REPEATED = 3  # words that are said twice in a row
 _whole: ContextVar[bool] = ContextVar("whole", default=False)
 
 
@@ -67,7 +67,19 @@ def needed(features: np.ndarray) -> int:
 def is_doubtful(segments: Sequence[Any]) -> bool:
     """Whether a transcript looks like a loop, or like a guess."""
     text = " ".join(segment.text for segment in segments)
-    return _TWICE.search(text) is not None or any(
+    return repeats_itself(text) or any(
         segment.compression_ratio > MOST_REPETITIVE or segment.avg_logprob < LEAST_LIKELY
         for segment in segments
     )
+
+
+def repeats_itself(text: str) -> bool:
+    """Whether three words or more are said twice in a row."""
+    words = _WORD.findall(text.lower())
+    for size in range(LEAST_REPEATED, len(words) // 2 + 1):
+        alike = 0  # words in a row that come again `size` words later
+        for word, later in zip(words, words[size:], strict=False):
+            alike = alike + 1 if word == later else 0
+            if alike == size:
+                return True
+    return False
