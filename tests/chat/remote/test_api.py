@@ -3,6 +3,7 @@
 import asyncio
 import io
 import json
+import socket
 import wave
 
 import httpx
@@ -229,3 +230,22 @@ async def test_a_request_that_never_comes_gives_its_place_back(monkeypatch):
             assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
             assert (await http.post("v1/chat/completions", json=ask)).status_code == 200
         writer.close()
+
+
+async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
+    monkeypatch.setattr(door, "SILENCE", 0.5)
+    body = json.dumps({"input": "One two three four five six seven. " * 116}).encode()  # 9 MB
+    async with serving(service_app("voice", make_voice, Limits(requests=1))) as url:
+        address = httpx.URL(url)
+        with socket.socket() as silent:
+            silent.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            silent.setblocking(False)
+            await asyncio.get_running_loop().sock_connect(silent, (address.host, address.port))
+            head = "POST /v1/audio/speech HTTP/1.1", f"Host: {address.netloc.decode()}"
+            kind = "Content-Type: application/json", f"Content-Length: {len(body)}"
+            silent.send("\r\n".join((*head, *kind, "", "")).encode() + body)
+            async with httpx.AsyncClient(base_url=url) as http, asyncio.timeout(60):
+                await asyncio.sleep(0.2)
+                assert (await http.get("v1/models")).status_code == 429
+                while (await http.get("v1/models")).status_code == 429:
+                    await asyncio.sleep(0.2)

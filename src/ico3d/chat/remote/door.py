@@ -11,7 +11,10 @@ from ico3d.chat.remote.limits import Limits
 
 OPEN_PATHS = ("/health",)
 SILENCE = 10.0
-"""Seconds without a byte after which a request that is not whole is given up."""
+"""Seconds without a byte after which a request that is not whole is given up.
+
+So is an answer of which nothing is read for as long.
+"""
 BROKEN, BUSY = 1008, 1013  # WebSocket close codes
 
 
@@ -73,13 +76,23 @@ class Body:
         return {"type": "http.disconnect"} if self._is_over else message
 
     async def send(self, message: Message) -> None:
-        """Passes the answer on; after a request beyond the limit, sends a refusal instead."""
+        """Passes the answer on; after a request beyond the limit, sends a refusal instead.
+
+        Raises:
+            OSError: If the client does not read, which counts as gone.
+        """
         if not self._is_over or self._scope["type"] != "http":
-            await self._send(message)
+            await self._delivered(message)
         elif not self._refused and message["type"] == "http.response.start":
             self._refused = True
             refusal = error_response(413, too_large(self._megabytes))
             await refusal(self._scope, self._receive, self._send)
+
+    async def _delivered(self, message: Message) -> None:
+        try:
+            await asyncio.wait_for(self._send(message), SILENCE)
+        except TimeoutError:
+            raise ConnectionAbortedError("the client does not read its answer.") from None
 
     def _patience(self) -> float | None:
         """Seconds in which more has to come; None where all is here."""
