@@ -249,3 +249,14 @@ async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
                 assert (await http.get("v1/models")).status_code == 429
                 while (await http.get("v1/models")).status_code == 429:
                     await asyncio.sleep(0.2)
+
+
+async def test_a_request_of_thousands_of_tools_or_messages_is_refused():
+    said, tool = {"role": "user", "content": "hi"}, {"function": {"name": "a"}}
+    async with (
+        serving(service_app("language", make_language)) as url,
+        httpx.AsyncClient(base_url=url) as http,
+    ):
+        for ask in ({"messages": [said], "tools": [tool] * 129}, {"messages": [said] * 10_001}):
+            answer = await http.post("v1/chat/completions", json=ask)
+            assert answer.status_code == 400 and "at most" in answer.json()["error"]["message"]

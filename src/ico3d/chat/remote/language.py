@@ -27,6 +27,7 @@ from ico3d.chat.remote.headless import Spares, run
 from ico3d.errors import ServiceError
 
 THOUGHTS = "reasoning_content"
+MOST_MESSAGES, MOST_TOOLS = 10_000, 128  # of a request: each is looked at in the loop of everybody
 SAMPLING = ("temperature", "top_p", "max_tokens", "seed", "frequency_penalty", "presence_penalty")
 
 
@@ -47,9 +48,9 @@ class Tool(BaseModel):
 class ChatRequest(BaseModel):
     """A conversation to continue; other fields, such as the model's name, are ignored."""
 
-    messages: list[dict[str, Any]] = Field(min_length=1)
+    messages: list[dict[str, Any]] = Field(min_length=1, max_length=MOST_MESSAGES)
     stream: bool = False
-    tools: list[Tool] = []
+    tools: list[Tool] = Field(default=[], max_length=MOST_TOOLS)
     temperature: float | None = None
     top_p: float | None = None
     max_tokens: int | None = None
