@@ -30,6 +30,7 @@ def told_together(head: Provenance, body: Provenance) -> Provenance:
             Part("head", head.kind, head.likeness),
             Part("body", body.kind, body.likeness),
         ),
+        voice=head.voice,
     )
 
 

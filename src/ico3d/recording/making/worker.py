@@ -14,7 +14,7 @@ from ico3d.common.files import write_atomic
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError
-from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
 from ico3d.recording.making.beside import end_with_parent
 from ico3d.recording.making.joining import join
@@ -48,6 +48,7 @@ def make(person: Person, quality: QualityName, body: Path | None = None) -> Path
             consent=about["consent"],
             licence=about["licence"],
             made_by=about["made_by"],
+            voice_consent=about.get(VOICE_CONSENT, ""),
             body=body,
         )
         create(settings, tell)
