@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.persona import Persona
@@ -84,5 +85,5 @@ def _speaker(choice: Choice, voices: Mapping[str, str], own: Own) -> str:
 
 def _options(choice: Choice, voices: Mapping[str, str], own: Own) -> OwnVoice:
     given = filled(Settings, choice.options, f"chat settings: voice '{OPENVOICE}'")
-    spoken = {"voice": _speaker(choice, voices, own), "tone": own.tone}
+    spoken: dict[str, Any] = {"voice": _speaker(choice, voices, own), "tone": own.tone}
     return OwnVoice(**(vars(given) | spoken))

@@ -8,7 +8,7 @@ import soxr
 from ico3d.capture.capture import Sound
 from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
-from ico3d.creating.looking.sound_checks import ABOVE_NOISE, SILENT, WINDOW, clips
+from ico3d.creating.looking.sound_checks import ABOVE_NOISE, SILENT, clips
 
 FRAME = 512
 """Samples at 16 kHz of which Silero says whether they are speech: 32 ms."""
@@ -16,6 +16,8 @@ SPEECH = 0.5
 """Silero's confidence from which on they are."""
 BRIDGED, SHORTEST = 0.13, 0.6
 """Seconds of a break that does not end a stretch, and of the shortest stretch that is taken."""
+AROUND, PIECE, SOFTEST = 2.0, 0.05, 0.1
+"""Noise is the softest tenth of the pieces, of so many seconds, as far around a stretch as that."""
 LEAST, MOST = 10.0, 60.0
 """Seconds of clean speech that a voice needs, and that are taken at most."""
 LEVEL, PEAK = -23.0, 0.98
@@ -52,12 +54,14 @@ def clean_speech(sound: Sound | None) -> Speech:
     if heard < LEAST:
         if loudness(sound.samples) < SILENT:
             return _none("the recording is silent.")
-        return _none(f"{heard:.0f} s of speech are heard, and {LEAST:.0f} s are needed: talk more.")
+        return _none(
+            f"{int(heard)} s of speech are heard, and {LEAST:.0f} s are needed: talk more."
+        )
     clean = _cleanest(sound, found)
     seconds = sum(end - begin for begin, end in clean)
     if seconds < LEAST:
         return _none(
-            f"{seconds:.0f} s of speech are free of noise and clipping, and {LEAST:.0f} s are "
+            f"{int(seconds)} s of speech are free of noise and clipping, and {LEAST:.0f} s are "
             "needed: find a quiet room, and do not come too close to the microphone."
         )
     pause = np.zeros(round(APART * sound.rate), np.float32)
@@ -72,7 +76,8 @@ def is_speech(sound: Sound) -> np.ndarray:
     pcm = (frames.clip(-1, 1) * 32767).astype(np.int16)
     silero = EagerSilero(pause=0.2)
     silero.set_sample_rate(MICROPHONE_RATE)
-    return np.array([silero.voice_confidence(frame.tobytes()) >= SPEECH for frame in pcm], bool)
+    confidence = [np.ravel(silero.voice_confidence(frame.tobytes())) for frame in pcm]  # (1,) each
+    return np.array(confidence).reshape(-1) >= SPEECH
 
 
 def stretches(speech: np.ndarray, step: float) -> list[tuple[float, float]]:
@@ -99,8 +104,7 @@ def loudness(samples: np.ndarray) -> float:
 
 def _cleanest(sound: Sound, found: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The stretches that stand most above the noise, by time; none that is noisy or clipped."""
-    noise = _noise(sound)
-    above = {span: loudness(_cut(sound, span)) - noise for span in found}
+    above = {span: loudness(_cut(sound, span)) - _noise(sound, span) for span in found}
     taken: list[tuple[float, float]] = []
     for begin, end in sorted(found, key=lambda span: -above[span]):
         room = MOST - sum(b - a for a, b in taken)
@@ -111,12 +115,12 @@ def _cleanest(sound: Sound, found: list[tuple[float, float]]) -> list[tuple[floa
     return sorted(taken)
 
 
-def _noise(sound: Sound) -> float:
-    """Loudness of what is heard between words: of the softest tenth of the recording."""
-    length = round(WINDOW * sound.rate)
-    count = len(sound.samples) // length
-    pieces = sound.samples[: count * length].reshape(count, length)  # (P, n)
-    return float(np.quantile([loudness(piece) for piece in pieces], 0.1))
+def _noise(sound: Sound, span: tuple[float, float]) -> float:
+    """Loudness of what is heard between the words of a stretch and just before and behind it."""
+    near = _cut(sound, (max(span[0] - AROUND, 0.0), span[1] + AROUND))
+    length = round(PIECE * sound.rate)
+    pieces = near[: len(near) // length * length].reshape(-1, length)  # (P, n)
+    return float(np.quantile([loudness(piece) for piece in pieces], SOFTEST))
 
 
 def _cut(sound: Sound, span: tuple[float, float]) -> np.ndarray:
