@@ -164,3 +164,15 @@ def test_the_bundle_is_given_it(settings, fake, tmp_path):
     give_voice(tmp_path / "plain.ico3d", found.about, found.tone, settings.out)
     bundle = Bundle.open(settings.out)
     assert bundle.voice is not None and (bundle.voice == found.tone).all()
+
+
+def test_the_terminal_says_whether_there_is_a_voice(settings, capsys):
+    from ico3d.creating.telling import Terminal
+
+    tell = Terminal(settings)
+    tell(Voiced(31.4))
+    tell(Voiced(0.0, "the recording is silent."))
+    assert capsys.readouterr().out.splitlines() == [
+        "The avatar's voice is cloned from 31 s of clean speech.",
+        "The avatar is made without a voice of its own: the recording is silent.",
+    ]

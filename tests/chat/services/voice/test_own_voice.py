@@ -1,5 +1,7 @@
 """An avatar's own voice: heard where OpenVoice is installed, and why not where it is not."""
 
+from types import SimpleNamespace
+
 import httpx
 import numpy as np
 import pytest
@@ -12,13 +14,16 @@ from ico3d.bundle.format import Bundle, give_voice  # noqa: E402
 from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice  # noqa: E402
 from ico3d.bundle.people.voice import SIZE, VOICE  # noqa: E402
 from ico3d.bundle.persona import Persona  # noqa: E402
+from ico3d.chat.doctor.machine import of_avatar  # noqa: E402
 from ico3d.chat.services import choose  # noqa: E402
 from ico3d.chat.services.offers import named, offers  # noqa: E402
 from ico3d.chat.services.own_voice import Own, own_of, unheard  # noqa: E402
 from ico3d.chat.services.voice import openvoice  # noqa: E402
+from ico3d.chat.serving import server  # noqa: E402
 from ico3d.chat.serving.bundle_files import BundleFiles  # noqa: E402
 from ico3d.chat.serving.server import open_avatar  # noqa: E402
 from ico3d.chat.settings.conversation import ChatSettings, Choice  # noqa: E402
+from ico3d.cli import main  # noqa: E402
 
 LEVEL = 0.125
 TONE = np.full(SIZE, LEVEL, np.float32)
@@ -43,11 +48,16 @@ def installed(fake, monkeypatch, models):
 
 
 @pytest.fixture(scope="module")
-def voiced(bundle_path, tmp_path_factory):
+def voiced_path(bundle_path, tmp_path_factory):
     """A bundle with a cloned voice."""
     path = tmp_path_factory.mktemp("voiced") / "ada.ico3d"
     give_voice(bundle_path, ClonedVoice(OPENVOICE, "ada.mp4", "agreed"), TONE, path)
-    return Bundle.open(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def voiced(voiced_path):
+    return Bundle.open(voiced_path)
 
 
 def own(*languages):
@@ -110,6 +120,26 @@ def test_without_openvoice_there_is_one_sentence(models):
     assert unheard(BEST.voice, {}, own()).startswith("melo is not installed: the commands are in")
     assert choose(BEST, {}, own()).voice.provider.title != "OpenVoice V2"
     assert openvoice.cloning_hindrance().startswith("openvoice is not installed: the commands are")
+
+
+def test_the_start_and_the_doctor_say_why_it_is_not_heard(
+    voiced_path, bundle_path, tmp_path, monkeypatch, capsys
+):
+    def make_server(*_):
+        return SimpleNamespace(run=lambda sockets: [listener.close() for listener in sockets])
+
+    monkeypatch.setattr(server, "make_server", make_server)
+    file = tmp_path / "chat.toml"
+    file.write_text('recognition = "browser"\nlanguage = "persona-notes"\nvoice = "espeak-ng"\n')
+    lost = "the avatar has a voice of its own, which is not heard"
+    for path, told in ((voiced_path, True), (bundle_path, False)):
+        assert main(["serve", str(path), "--port", "0", "--settings", str(file)]) == 0
+        said = f"\n  {lost}: the settings choose another voice.\n"
+        assert (said in capsys.readouterr().out) == told
+        found = [one for one in of_avatar(path, file) if one.what == lost]
+        assert [(one.grade, one.mend) for one in found] == (
+            [("weak", "the settings choose another voice.")] * told
+        )
 
 
 def test_visitors_are_offered_it(installed):
