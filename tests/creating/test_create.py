@@ -97,17 +97,20 @@ def test_on_the_body_of_another(tracked, settings, monkeypatch, capfd):
     put = []
 
     def run(embody):
-        put.append((embody.body.name, embody.head.name))
+        look = (embody.build, embody.outfit)
+        put.append(look if put else (embody.body.name, embody.head.name, *look))
         embody.out.write_bytes(embody.head.read_bytes())
 
     monkeypatch.setattr(room.Embody, "run", run)
     settings = replace(settings, body=FILE)
     create(settings, [].append)
-    assert put == [(FILE.name, room.HEAD_ALONE)] and settings.out.is_file()
+    assert put == [(FILE.name, room.HEAD_ALONE, "medium", "recorded")] and settings.out.is_file()
     create(settings, [].append)
     assert len(put) == 1
+    create(replace(settings, build="sturdy", outfit="navy"), [].append)
+    assert put[1:] == [("sturdy", "navy")]
     create(replace(settings, body=None), [].append)
-    assert len(put) == 1 and len(tracked) == 1
+    assert len(put) == 2 and len(tracked) == 1
 
 
 VOICE = Cloned(np.ones(256, np.float32), ClonedVoice(OPENVOICE, "ada.mp4", "my voice, too"))
@@ -159,6 +162,16 @@ def test_a_body_that_cannot_be_used_is_told_before_the_work(tracked, settings, t
         with pytest.raises(BundleError, match=why):
             create(replace(settings, body=tmp_path / body), print)
     assert not tracked and not settings.out.exists()
+
+
+def test_a_head_alone_has_no_build(tracked, settings):
+    with pytest.raises(SettingsError) as refused:
+        create(replace(settings, build="slender"), print)
+    assert str(refused.value) == (
+        "--build and --outfit are those of a stand-in's body: say which one by --body, such as "
+        "--body demo."
+    )
+    assert not tracked
 
 
 def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):

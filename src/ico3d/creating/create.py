@@ -10,6 +10,7 @@ from ico3d.avatar.baking.telling.about import provenance_of
 from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.avatar.embodying.command import Embody
 from ico3d.avatar.embodying.embody import body_in
+from ico3d.avatar.embodying.look import check_look
 from ico3d.bundle.format import Bundle, give_voice
 from ico3d.bundle.persona import Persona, read_persona
 from ico3d.capture.capture import Capture
@@ -56,16 +57,17 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
     Raises:
         BundleError: If the bundle of the body cannot be used.
         CaptureError: If no avatar can be made of the video; the sentence says why.
-        SettingsError: If the avatar's name or the folder belongs to something else, or nobody says
-            that the person agreed.
+        SettingsError: If the avatar's name or the folder belongs to something else, nobody says
+            that the person agreed, or a head alone is to have a build or an outfit.
         StorageError: If the disk is full, or cannot be written.
         MissingModelError: If the face model is not installed.
         Ico3dError: As for the verbs that track, train and bake.
     """
     begin = time.monotonic()
     persona, said = _persona(settings), _statement(settings)
+    check_look(settings.body, settings.look)
     if settings.body is not None:
-        body_in(Bundle.open(settings.body))  # said before the work, not after it
+        body_in(Bundle.open(settings.body), settings.look)  # said before the work, not after it
     with workplace(settings) as place, full_disk(place.folder):
         if place.is_done(settings) and not awaits_voice(settings, place):
             return _made(settings, place, begin, tell)
@@ -178,7 +180,7 @@ def _bake(
         give_voice(baked, voice.about, voice.tone, settings.out if settings.body is None else baked)
     if settings.body is not None:
         tell(Advanced("bake", 0.7, "putting the head on a body"))
-        Embody(baked, settings.out, settings.body).run()
+        Embody(baked, settings.out, settings.body, settings.build, settings.outfit).run()
     tell(Advanced("bake", 1.0, "made"))
 
 

@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
+from ico3d.avatar.embodying.look import AS_RECORDED, Look, OutfitName
 from ico3d.common.device import DeviceName
 from ico3d.common.people.stated import NOT_STATED
 from ico3d.head.settings import PRESETS, HeadSettings
@@ -35,6 +37,8 @@ class CreateSettings:
             manifest. Without it no voice is cloned.
         body: A whole person on a skeleton, whose body stands in for that of which the video shows
             nothing; `demo` is the avatar of the package. By default the avatar is a head alone.
+        build: Build of that body; `medium` is the one that was recorded.
+        outfit: Colours of its clothes; `recorded` are those that were.
     """
 
     video: Annotated[Path, tyro.conf.Positional]
@@ -47,6 +51,13 @@ class CreateSettings:
     device: DeviceName = "auto"
     voice_consent: str = ""
     body: Path | None = None
+    build: BuildName = MEDIUM
+    outfit: OutfitName = AS_RECORDED
+
+    @property
+    def look(self) -> Look:
+        """How the body is to look."""
+        return Look(self.build, self.outfit)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from ico3d.avatar.embodying.look import UNCHANGED
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.voice import VOICE as TONE
 from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import is_stated
+from ico3d.common.typed import plain
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import SettingsError, StorageError
 from ico3d.training.notes.state import begun, ended, note
@@ -155,6 +157,7 @@ def _wanted(settings: CreateSettings, bundle: Path) -> dict:
         "bundle": _digest(bundle),
         **({} if body is None else {"body": _digest(bundle_path(body))}),
         **({"voice": voice} if is_stated(voice) else {}),
+        **({} if settings.look == UNCHANGED else {"look": plain(settings.look)}),
     }
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
 
+from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.server import add_page
 from ico3d.chat.serving.sites import Sites, add_tokens
@@ -303,7 +304,12 @@ async def _form(request: Request) -> dict[str, Any]:
 
 
 def open_room(
-    folder: Path, host: str, tls: bool, body: Path | None = None, voices: bool = False
+    folder: Path,
+    host: str,
+    tls: bool,
+    body: Path | None = None,
+    look: Look = UNCHANGED,
+    voices: bool = False,
 ) -> Room:
     """What a server of the studio page shares.
 
@@ -312,8 +318,9 @@ def open_room(
         host: Address to which it is bound.
         tls: Whether it serves by HTTPS.
         body: A whole person whose body the avatars get; None makes heads alone.
+        look: Build and outfit of that body.
         voices: Whether people are asked if their voice may be cloned, too.
     """
     people = People(folder)
-    servers = Makers(people, body), Talks(host, tls)
+    servers = Makers(people, body, look), Talks(host, tls)
     return Room(people, Eye(), *servers, voices, defaultdict(asyncio.Lock))

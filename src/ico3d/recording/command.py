@@ -8,6 +8,9 @@ from typing import Annotated
 
 import tyro
 
+from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
+from ico3d.avatar.embodying.look import AS_RECORDED, Look, OutfitName, check_look
+
 
 @dataclass(frozen=True)
 class Studio:
@@ -24,6 +27,8 @@ class Studio:
         browser: Open the page in a browser.
         body: A whole person on a skeleton, whose body stands in for that of everybody who records
             themselves; `demo` is the avatar of the package. By default avatars are heads alone.
+        build: Build of that body; `medium` is the one that was recorded.
+        outfit: Colours of its clothes; `recorded` are those that were.
         voice: Ask people, too, whether the avatar may speak with their voice: a tick of its own,
             off unless they set it. Their voice is then cloned where OpenVoice is installed.
     """
@@ -34,15 +39,20 @@ class Studio:
     tls: bool = False
     browser: bool = True
     body: Path | None = None
+    build: BuildName = MEDIUM
+    outfit: OutfitName = AS_RECORDED
     voice: bool = False
 
     def run(self) -> None:
         """Serves until interrupted.
 
         Raises:
-            SettingsError: If others could come without HTTPS, the port is taken, or the folder
-                cannot be made.
+            BundleError: If the body cannot be used.
+            SettingsError: If others could come without HTTPS, the port is taken, the folder cannot
+                be made, or heads alone are to have a build or an outfit.
         """
+        from ico3d.avatar.embodying.embody import body_in
+        from ico3d.bundle.format import Bundle
         from ico3d.chat.observing.operator_log import set_up_log
         from ico3d.chat.serving import server
         from ico3d.chat.serving.guard import LOOPBACK
@@ -53,6 +63,10 @@ class Studio:
         from ico3d.errors import SettingsError
         from ico3d.recording.app import make_app, open_room
 
+        look = Look(self.build, self.outfit)
+        check_look(self.body, look)
+        if self.body is not None:
+            body_in(Bundle.open(self.body), look)  # said before somebody records themselves
         set_up_log(verbose=False)
         if self.host not in LOOPBACK and not self.tls:
             raise SettingsError(
@@ -65,7 +79,7 @@ class Studio:
         listener = server.bind(self.host, self.port)
         try:
             where = (self.folder.absolute(), self.host, self.tls)
-            room = open_room(*where, self.body, self.voice)
+            room = open_room(*where, self.body, look, self.voice)
         except OSError as error:
             raise SettingsError(f"{self.folder} cannot be written ({error.strerror}).") from error
         app = make_app(room, self.host, sites, reach.answered)

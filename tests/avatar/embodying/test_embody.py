@@ -7,6 +7,7 @@ import pytest
 
 from ico3d.avatar.baking.person_bundle import moved_head
 from ico3d.avatar.embodying import embody as room
+from ico3d.avatar.embodying.look import Look
 from ico3d.avatar.joining.similarity import moved
 from ico3d.avatar.poseable import poseable_of
 from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, Bundle, write_bundle
@@ -142,6 +143,37 @@ def test_it_is_told_which_part_is_recorded(whole):
     assert (told.kind, told.likeness, told.consent) == ("portrait, synthetic", "Ada", "agreed")
     assert told.sources[0] == "ada.mp4" and len(told.sources) > 1
     assert not told.is_synthetic and told.has_consent
+
+
+def test_the_bundle_says_which_build_and_outfit_were_chosen(alone, landmarks, whole, tmp_path):
+    out, known = tmp_path / "ada.ico3d", {"Iris": landmarks, "Ada": moved(ABROAD, landmarks)}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(room, "_landmarks", lambda bundle, head: known[bundle.manifest.name])
+        words = ["embody", str(alone), str(out), "--build", "sturdy", "--outfit", "navy"]
+        assert main(words) == 0
+    other, nobody = Bundle.open(out), "nobody: no such person exists"
+    told = other.manifest.provenance.parts
+    assert told[1] == Part("body", "synthetic", nobody, "sturdy", "navy")
+    assert told[0] == whole.manifest.provenance.parts[0]
+    for name in (HEAD, POSES, SPEECH):  # the same head in the same place
+        assert other.read(name) == whole.read(name)
+    assert other.skinned.info.num_gaussians == whole.skinned.info.num_gaussians
+    person = poseable_of(other, None)
+    assert person is not None and {"wave", "nod"} <= person.clips.keys()
+
+
+def test_a_body_that_cannot_look_so_is_refused_at_once(alone, demo):
+    strange = Bundle.open(FILE)
+    names = tuple(name.replace("upperleg", "thigh") for name in demo.skinned.rig.names)
+    body = replace(demo.skinned, info=replace(demo.skinned.info, names=names))
+    strange.skinned = body
+    with pytest.raises(BundleError, match="only bodies on MakeHuman's skeleton"):
+        room.body_in(strange, Look("slender"))
+    left = np.flatnonzero(body.means[:, 1] > 0.3)
+    strange.skinned = demo.skinned.chosen(left)
+    with pytest.raises(BundleError, match="no shoes are found"):
+        room.body_in(strange, Look(outfit="wine"))
+    assert room.body_in(strange) is strange.skinned
 
 
 def test_a_body_without_a_skeleton_is_refused(alone, tmp_path):

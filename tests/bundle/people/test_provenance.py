@@ -42,6 +42,23 @@ def test_what_comes_from_whom_is_carried():
     ]
 
 
+def test_how_a_body_was_changed_is_carried_and_else_not_written():
+    body = Part("body", "synthetic", "nobody", "sturdy", "")
+    assert stored(replace(FULL, parts=(body,)))["parts"] == [
+        {"name": "body", "kind": "synthetic", "likeness": "nobody", "build": "sturdy"}
+    ]
+
+
+@pytest.mark.parametrize("part", [None, [], {"name": "body"}, {"build": 3}, {"height": "tall"}])
+def test_parts_that_make_no_sense_are_refused(part):
+    manifest = json.loads(random_manifest(random_head(10)).to_json())
+    if part and "name" not in part:
+        part = {"name": "body", "kind": "synthetic", "likeness": "nobody"} | part
+    told = manifest["provenance"] | {"parts": [part]}
+    with pytest.raises(BundleError, match=r"manifest\.json\.provenance\.parts"):
+        Manifest.from_json(json.dumps(manifest | {"provenance": told}).encode())
+
+
 def test_what_is_not_stated_is_not_written_so_that_older_programs_can_read_it():
     older = Provenance("portrait", ("me.mp4",), "agreed", "CC0-1.0")
     assert set(stored(older)) == {"kind", "sources", "consent", "licence"}

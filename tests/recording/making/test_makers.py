@@ -3,10 +3,13 @@
 import os
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
+from ico3d.avatar.embodying.look import Look
 from ico3d.recording.keeping.people import People
+from ico3d.recording.making import makers as room
 from ico3d.recording.making.makers import Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, read_progress, write_progress
@@ -107,3 +110,20 @@ def test_consent_comes_first(people, makers):
     ida.remove("text-1")
     assert _codes(lambda: makers.begin(ida, "good")) == "nothing"
     assert _codes(lambda: makers.begin(ida, "perfect")) == "quality"
+
+
+def test_the_body_and_its_look_are_passed_on(people, monkeypatch):
+    asked = []
+
+    class Process:
+        def poll(self):
+            return 0
+
+    monkeypatch.setattr(room, "start", lambda worker, words, log: asked.append(words) or Process())
+    ada = people.person("Ada")
+    for made in (Makers(people), Makers(people, Path("demo"), Look("slender", "navy"))):
+        made.begin(ada, "good")
+    assert asked == [
+        [str(ada.folder), "good"],
+        [str(ada.folder), "good", "demo", "slender", "navy"],
+    ]

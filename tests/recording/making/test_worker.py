@@ -78,6 +78,11 @@ def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
     monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick"])
     assert worker.main() == 0
     assert [settings.body for settings in asked] == [Path("demo"), None]
+    chosen = ["worker", str(person.folder), "quick", "demo", "sturdy", "wine"]
+    monkeypatch.setattr(worker.sys, "argv", chosen)
+    assert worker.main() == 0
+    looks = [(settings.build, settings.outfit) for settings in asked]
+    assert looks == [("medium", "recorded")] * 2 + [("sturdy", "wine")]
 
 
 def test_the_same_parts_go_on_and_other_parts_begin_anew(person, asked, tmp_path):

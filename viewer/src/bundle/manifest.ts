@@ -75,6 +75,8 @@ export interface Part {
   name: 'head' | 'body';
   kind: string; // of the recordings
   likeness: string;
+  build?: string; // of a body that was changed, else as recorded
+  outfit?: string; // likewise
 }
 
 /** Whose likeness the avatar is, who agreed, who made it of what; older bundles lack the optional entries. */

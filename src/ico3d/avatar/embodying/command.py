@@ -5,6 +5,8 @@ from pathlib import Path
 
 import tyro
 
+from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
+from ico3d.avatar.embodying.look import AS_RECORDED, Look, OutfitName
 from ico3d.bundle.packaged import NAME
 
 
@@ -19,11 +21,15 @@ class Embody:
         head: The avatar whose head, voice and persona are kept, NAME.ico3d.
         out: The bundle to write.
         body: A whole person on a skeleton; `demo` is the avatar of the package.
+        build: Build of the body; `medium` is the one that was recorded.
+        outfit: Colours of its clothes; `recorded` are those that were.
     """
 
     head: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
     body: Path = Path(NAME)
+    build: BuildName = MEDIUM
+    outfit: OutfitName = AS_RECORDED
 
     def run(self) -> None:
         """Fits, colours, writes and checks the bundle.
@@ -37,6 +43,7 @@ class Embody:
         from ico3d.bundle.format import Bundle
 
         console = Console()
-        embody(Bundle.open(self.head), Bundle.open(self.body), self.out, console.print)
+        look = Look(self.build, self.outfit)
+        embody(Bundle.open(self.head), Bundle.open(self.body), self.out, console.print, look)
         Bundle.open(self.out)
         console.print(f"{self.out}: {self.out.stat().st_size / 1e6:.2f} MB.")

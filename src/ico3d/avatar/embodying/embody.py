@@ -10,8 +10,13 @@ import torch
 from ico3d.avatar import staging
 from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.baking.person_bundle import moved_head
+from ico3d.avatar.embodying.builds.change import change_to
+from ico3d.avatar.embodying.builds.names import MEDIUM
+from ico3d.avatar.embodying.builds.reshape import gestures_in, reshaped
 from ico3d.avatar.embodying.drawn_colors import drawn_colors
 from ico3d.avatar.embodying.face import Face
+from ico3d.avatar.embodying.look import AS_RECORDED, UNCHANGED, Look
+from ico3d.avatar.embodying.outfits import dressed
 from ico3d.avatar.embodying.surfaces import Surfaces, surfaces_of
 from ico3d.avatar.embodying.telling import told_together
 from ico3d.avatar.joining.finding.found_face import face_seeker
@@ -35,7 +40,9 @@ BOUND = 2.5
 """Most by which a colour's logit may change: more than from the palest skin to the darkest."""
 
 
-def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
+def embody(
+    head: Bundle, body: Bundle, out: Path, report: Report, look: Look = UNCHANGED
+) -> Manifest:
     """Writes a whole person: the head of one bundle on the body of another.
 
     The head is given the size of the head that is on the body, and its place on the joint; what
@@ -48,16 +55,18 @@ def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
         body: The bundle of a whole person on a skeleton.
         out: The file to write.
         report: Called with what was measured.
+        look: Build and outfit of the body.
 
     Raises:
-        BundleError: If one of the bundles lacks a head, or the second a body on a skeleton.
+        BundleError: If one of the bundles lacks a head, the second a body on a skeleton, or that
+            body cannot look so.
         MissingExtraError: If MediaPipe is not installed.
         MissingModelError: If the file of MediaPipe's face landmarker is not there.
         ModelError: If a head shows no face.
     """
     given, _ = head.require_head()
     own, poses = body.require_head()
-    skinned = body_in(body)
+    skinned = body_in(body, look)
     faces = _landmarks(head, given), _landmarks(body, own)
     matrix, rest = canonical_from_head(faces[1], faces[0])
     report(fit_in_words(matrix, rest))
@@ -68,21 +77,27 @@ def embody(head: Bundle, body: Bundle, out: Path, report: Report) -> Manifest:
     there = there.transform(np.linalg.inv(poses[0].astype(np.float64)))  # in head space
     means = there.means.numpy().astype(np.float64)  # (N, 3)
     behind = before.in_crown(means) & (before.behind(means) > 0)
-    surfaces = surfaces_of(skinned, cast(skinned.rig), behind)
+    roles = cast(skinned.rig)
+    surfaces = surfaces_of(skinned, roles, behind)
     kept = ~(surfaces.head & (face.region.depth(means) > 0))
     kept &= ~((surfaces.head | (surfaces.hair > 0.5)) & before.beyond(means))
     idle = _idle(head, shown)
     skin, hair = _gains((idle, face), (_idle(body, own), before), there[torch.from_numpy(kept)])
     report(_gains_in_words(skin, hair))
-    tinted = _tinted(skinned, surfaces, skin, hair).chosen(np.flatnonzero(kept))
-    return _written(out, head, body, shown, tinted)
+    clothed = dressed(skinned, roles, surfaces, look.outfit)
+    tinted = _tinted(clothed, surfaces, skin, hair).chosen(np.flatnonzero(kept))
+    return _written(out, head, body, shown, reshaped(tinted, look.build), look)
 
 
-def body_in(bundle: Bundle) -> BakedSkinned:
+def body_in(bundle: Bundle, look: Look = UNCHANGED) -> BakedSkinned:
     """The body that can stand in for that of another person.
 
+    Args:
+        bundle: A whole person.
+        look: Build and outfit that the body is to have.
+
     Raises:
-        BundleError: If the bundle lacks a head, or a body on a skeleton.
+        BundleError: If the bundle lacks a head, or a body on a skeleton that can look so.
     """
     bundle.require_head()
     if bundle.skinned is None:
@@ -90,7 +105,13 @@ def body_in(bundle: Bundle) -> BakedSkinned:
             f"the bundle of '{bundle.manifest.name}' has no body on a skeleton, which a head of "
             "another person could move with."
         )
-    return bundle.skinned
+    body = bundle.skinned
+    if look.build != MEDIUM:
+        change_to(look.build, body.rig)
+    if look.outfit != AS_RECORDED:
+        roles, none = cast(body.rig), np.zeros(body.info.num_gaussians, bool)
+        dressed(body, roles, surfaces_of(body, roles, none), look.outfit)
+    return body
 
 
 def _landmarks(bundle: Bundle, head: BakedHead) -> np.ndarray:
@@ -162,7 +183,7 @@ def _gains_in_words(skin: np.ndarray, hair: np.ndarray) -> str:
 
 
 def _written(
-    out: Path, head: Bundle, body: Bundle, shown: BakedHead, tinted: BakedSkinned
+    out: Path, head: Bundle, body: Bundle, shown: BakedHead, tinted: BakedSkinned, look: Look
 ) -> Manifest:
     """Writes the person."""
     about, moving = head.manifest, body.manifest
@@ -170,13 +191,16 @@ def _written(
     _, poses = body.require_head()
     person = BakedAvatar(shown, SkinnedBody(tinted), poses)
     first = person.gaussians(0.0, about.head.idle_expression)
-    kept = (ANIMATION, *([GESTURES] if GESTURES in moving.files else []))
-    files = {name: body.read(name) for name in kept} | {
-        HEAD: shown.to_bytes(),
-        POSES: poses_to_bytes(poses),
-        SKINNED: tinted.to_bytes(),
-        THUMBNAIL: staging.thumbnail(first, moving.camera, moving.background),
-    }
+    files = (
+        {ANIMATION: body.read(ANIMATION)}
+        | _gestures(body, tinted, look)
+        | {
+            HEAD: shown.to_bytes(),
+            POSES: poses_to_bytes(poses),
+            SKINNED: tinted.to_bytes(),
+            THUMBNAIL: staging.thumbnail(first, moving.camera, moving.background),
+        }
+    )
     if about.speech is not None:
         files[SPEECH] = head.read(SPEECH)
     if about.provenance.voice is not None:
@@ -200,7 +224,16 @@ def _written(
         background=moving.background,
         persona=about.persona,
         loss=Loss(None, None, None),
-        provenance=told_together(about.provenance, moving.provenance),
+        provenance=told_together(about.provenance, moving.provenance, look),
         skinned=tinted.info,
     )
     return write_bundle(out, *coarse_first(manifest, files))
+
+
+def _gestures(bundle: Bundle, body: BakedSkinned, look: Look) -> dict[str, bytes]:
+    """The file of gestures by its name, if the body has one."""
+    if GESTURES not in bundle.manifest.files:
+        return {}
+    if look.build == MEDIUM:
+        return {GESTURES: bundle.read(GESTURES)}
+    return gestures_in(body, look.build, bundle.cuts)

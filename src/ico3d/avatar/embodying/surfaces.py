@@ -33,13 +33,14 @@ def surfaces_of(body: BakedSkinned, cast: Cast, behind: np.ndarray) -> Surfaces:
 
     Hands are skin, what is behind the face above the ears is hair, chest and back are clothes; any
     other Gaussian is what its colour is most like. Of the head nothing is clothes; of hips and legs
+    all is.
 
     Args:
         body: The body.
         cast: Joints of its rig by role.
         behind: (N,) bool, Gaussians that are behind the face and above the ears.
     """
-    mainly = np.take_along_axis(body.joints, body.weights.argmax(1)[:, None], 1)[:, 0]  # (N,)
+    mainly = main_joints(body)  # (N,)
 
     def on(*roles: str) -> np.ndarray:
         joints = [joint for role in roles for joint in cast.joints.get(role, ())]
@@ -47,7 +48,7 @@ def surfaces_of(body: BakedSkinned, cast: Cast, behind: np.ndarray) -> Surfaces:
 
     fingers = on(*(role for side in SIDES for role in arm_roles(side)[4:]))
     trunk, head = on("spine", "chest"), on("head")
-    solid, colors = body.opacities > 127, _features(body.color_logits)
+    solid, colors = body.opacities > 127, features(body.color_logits)
     known = [colors[kind & solid] for kind in (fingers, head & behind, trunk)]
     middles = [np.median(part, axis=0) if len(part) else np.full(3, np.inf) for part in known]
     away = np.square(colors[:, None] - np.array(middles)).sum(2)  # (N, 3): skin, hair, clothes
@@ -55,17 +56,22 @@ def surfaces_of(body: BakedSkinned, cast: Cast, behind: np.ndarray) -> Surfaces:
     away[~(head | trunk | on("neck")), 1] = np.inf
     share = np.exp(-SHARPNESS * (away - away.min(1, keepdims=True)))
     share /= share.sum(1, keepdims=True)
-    share[on("hips") | np.isin(mainly, _legs(cast))] = 0, 0, 1
+    share[on("hips") | np.isin(mainly, legs(cast))] = 0, 0, 1
     return Surfaces(head, share[:, 0], share[:, 1])
 
 
-def _features(logits: np.ndarray) -> np.ndarray:
+def main_joints(body: BakedSkinned) -> np.ndarray:
+    """(N,) index of the joint that carries each Gaussian most."""
+    return np.take_along_axis(body.joints, body.weights.argmax(1)[:, None], 1)[:, 0]
+
+
+def features(logits: np.ndarray) -> np.ndarray:
     """(N, 3) two numbers of hue and one of brightness, of colours (N, 3) in logits."""
     red, green, blue = logits.astype(np.float64).T
     return np.stack([red - green, green - blue, BRIGHTNESS * (red + green + blue) / 3], 1)
 
 
-def _legs(cast: Cast) -> list[int]:
+def legs(cast: Cast) -> list[int]:
     """Joints of the legs, those without a role among them."""
     legs = {joint for side in SIDES for joint in cast.joints[f"{side}_hip"]}
     for joint, parent in enumerate(cast.rig.parents):

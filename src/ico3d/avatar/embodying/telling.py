@@ -1,10 +1,11 @@
 """What a bundle says of somebody whose head and body come from different people."""
 
+from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.bundle.people.provenance import Part, Provenance
 from ico3d.common.people.stated import BETWEEN, NOT_STATED, is_stated
 
 
-def told_together(head: Provenance, body: Provenance) -> Provenance:
+def told_together(head: Provenance, body: Provenance, look: Look = UNCHANGED) -> Provenance:
     """The provenance of the head of one person on the body of another.
 
     Only people who exist can agree: where one part is synthetic, consent and likeness are those of
@@ -13,6 +14,7 @@ def told_together(head: Provenance, body: Provenance) -> Provenance:
     Args:
         head: Of the head's bundle.
         body: Of the body's bundle.
+        look: How the body was changed.
     """
     both = (head, body)
     shown = [one for one in both if not one.is_synthetic] or [head]
@@ -28,7 +30,7 @@ def told_together(head: Provenance, body: Provenance) -> Provenance:
         made_on=head.made_on,
         parts=(
             Part("head", head.kind, head.likeness),
-            Part("body", body.kind, body.likeness),
+            look.told(body.kind, body.likeness),
         ),
         voice=head.voice,
     )

@@ -22,11 +22,15 @@ class Part:
         name: `head` or `body`.
         kind: Kind of that source's recordings; `synthetic` where nobody was recorded.
         likeness: Whose likeness the part is.
+        build: The build of a body that was changed; empty where it is as recorded.
+        outfit: The outfit of a body that was changed; empty where it is as recorded.
     """
 
     name: str
     kind: str
     likeness: str
+    build: str = ""
+    outfit: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,12 +103,27 @@ NEWER: dict[str, Any] = {
 
 def provenance_to_json(provenance: Provenance) -> dict[str, Any]:
     """A provenance as a bundle stores it."""
-    return {key: v for key, v in plain(provenance).items() if v != NEWER.get(key)}
+    told = {key: v for key, v in plain(provenance).items() if v != NEWER.get(key)}
+    if "parts" in told:
+        told["parts"] = [{k: v for k, v in part.items() if v} for part in told["parts"]]
+    return told
 
 
 def with_newer(value: Any) -> Any:
     """Adds what older bundles do not state to the parsed JSON of a provenance."""
-    return NEWER | cast(dict[str, Any], value) if isinstance(value, dict) else value
+    if not isinstance(value, dict):
+        return value
+    told = NEWER | cast(dict[str, Any], value)
+    if isinstance(told["parts"], list):
+        parts = cast(list[Any], told["parts"])
+        told["parts"] = [_with_look(part) for part in parts]
+    return told
+
+
+def _with_look(part: Any) -> Any:
+    """Adds to the parsed JSON of a part what is not said of those that are as recorded."""
+    unsaid = {"build": "", "outfit": ""}
+    return unsaid | cast(dict[str, Any], part) if isinstance(part, dict) else part
 
 
 def check_consent(provenance: Provenance, path: Path | str) -> None:

@@ -1,7 +1,7 @@
 """The bundle's file with the gestures and the figure of a body on a skeleton."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.posing import recorded_rotations
@@ -9,7 +9,8 @@ from ico3d.errors import BundleError, SettingsError
 from ico3d.motion.clip import Clip
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import living
-from ico3d.motion.recorded.cut import Cut, from_toml, to_toml
+from ico3d.motion.person import Person
+from ico3d.motion.recorded.cut import REST, Cut, from_toml, to_toml
 from ico3d.motion.recorded.cutting import find_cuts
 from ico3d.motion.recorded.making import hung_in, recorded_clips
 from ico3d.motion.recorded.recording import Recording, recording_of
@@ -20,12 +21,16 @@ GESTURES = "body/gestures.safetensors"
 """Name of the file. A body whose rig lacks a person's roles has none, and cannot gesture."""
 
 
-def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dict[str, bytes]:
+def gesture_files(
+    baked: BakedSkinned, cuts: Sequence[Cut] | None = None, width: float = 1.0
+) -> dict[str, bytes]:
     """Makes the file of gestures: recorded ones, and the package's where none was recorded.
 
     Args:
         baked: The body, as the bundle holds it.
         cuts: Gestures in the recording; None finds them by rule.
+        width: How many times as wide as the recorded one the trunk is. Where that is not 1, arms
+            hang as near to it as it allows, and not as they hung in the recording.
 
     Returns:
         Content of the file by its name; empty where the rig lacks a person's roles.
@@ -34,11 +39,20 @@ def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dic
     if recording is None:
         return {}
     info, cuts = baked.info, find_cuts(recording) if cuts is None else cuts
+    if width != 1:
+        recording = replace(recording, person=_widened(recording.person, width))
+        cuts = [cut for cut in cuts if cut.name != REST]
     somebody = living(baked.rig, 0, hung_in(recording, cuts))
-    others = library(somebody.person, hung=somebody.hung)
+    others = library(recording.person, hung=somebody.hung)
     clips = preferring(recorded_clips(recording, cuts), others)
     text = to_toml(cuts, info.fps, info.num_frames)
     return {GESTURES: repertoire_bytes(somebody, clips, text)}
+
+
+def _widened(person: Person, width: float) -> Person:
+    """A person with a trunk that is so many times as wide."""
+    wide, deep = person.thickness.torso
+    return replace(person, thickness=replace(person.thickness, torso=(width * wide, width * deep)))
 
 
 def recording_in(baked: BakedSkinned) -> Recording | None:

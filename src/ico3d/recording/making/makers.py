@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 from typing import cast
 
+from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.errors import StorageError
 from ico3d.recording.keeping.people import People
@@ -23,9 +24,23 @@ LOG = "log.txt"
 class Makers:
     """The processes that make avatars, one at a time: there is but one machine."""
 
-    def __init__(self, people: People, body: Path | None = None, worker: str = WORKER):
-        """Makes avatars of `people`, on a stand-in's `body` if given, by the module `worker`."""
-        self._people, self._body, self._worker = people, body, worker
+    def __init__(
+        self,
+        people: People,
+        body: Path | None = None,
+        look: Look = UNCHANGED,
+        worker: str = WORKER,
+    ):
+        """Makes avatars of people by processes of their own.
+
+        Args:
+            people: Whose.
+            body: A whole person whose body they get; None makes heads alone.
+            look: Build and outfit of that body.
+            worker: The module of the processes.
+        """
+        self._people, self._worker = people, worker
+        self._on = [] if body is None else [str(body), look.build, look.outfit]
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._lock = threading.Lock()
 
@@ -50,7 +65,7 @@ class Makers:
             folder.mkdir(exist_ok=True)
             write_progress(folder, begun(folder, cast(QualityName, quality)))
             with (folder / LOG).open("ab") as log:
-                words = [str(person.folder), quality, *([str(self._body)] if self._body else [])]
+                words = [str(person.folder), quality, *self._on]
                 self._running[person.name] = start(self._worker, words, log)
 
     def progress(self, person: Person) -> Progress | None:

@@ -1,4 +1,4 @@
-"""The process in which an avatar is made: `python -m …making.worker FOLDER QUALITY [BODY]`.
+"""The process in which an avatar is made: FOLDER QUALITY [BODY [BUILD OUTFIT]] are its words.
 
 It ends with the process that started it, and whoever starts it again goes on where it was.
 """
@@ -8,8 +8,9 @@ import re
 import shutil
 import sys
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
+from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.common.files import write_atomic
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
@@ -22,13 +23,16 @@ from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun
 
 
-def make(person: Person, quality: QualityName, body: Path | None = None) -> Path:
+def make(
+    person: Person, quality: QualityName, body: Path | None = None, look: Look = UNCHANGED
+) -> Path:
     """Makes the avatar of a person, or goes on with it; the progress tells of it and of its end.
 
     Args:
         person: Whose it is.
         quality: How well it is to be made.
         body: A whole person whose body it gets; None makes a head alone.
+        look: Build and outfit of that body.
 
     Returns:
         The avatar.
@@ -50,6 +54,8 @@ def make(person: Person, quality: QualityName, body: Path | None = None) -> Path
             made_by=about["made_by"],
             voice_consent=about.get(VOICE_CONSENT, ""),
             body=body,
+            build=look.build,
+            outfit=look.outfit,
         )
         create(settings, tell)
         write_atomic(places.avatar, lambda file: _copy(places.made, file))
@@ -97,9 +103,10 @@ def _copy(file: Path, to: Path) -> None:
 def main() -> int:
     """Makes an avatar; the exit status."""
     end_with_parent()
-    folder, quality, *body = sys.argv[1:]
+    folder, quality, *on = sys.argv[1:]
+    body, look = (Path(on[0]), Look(*cast(list[Any], on[1:]))) if on else (None, UNCHANGED)
     try:
-        make(Person(Path(folder)), cast(QualityName, quality), *map(Path, body))
+        make(Person(Path(folder)), cast(QualityName, quality), body, look)
     except Ico3dError as error:
         print(f"ico3d: {error}", file=sys.stderr)
         return 1
