@@ -1,6 +1,7 @@
 """Whole synthetic people: bones, gestures, cameras all around, and what is written."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -234,6 +235,37 @@ def test_every_camera_sees_everybody_whole(subject):
             for camera in cameras:
                 pixels, _ = camera.project(skin)
                 assert (pixels > 0).all() and (pixels < (camera.width, camera.height)).all()
+
+
+def test_near_cameras_show_the_upper_body_larger(subject):
+    far, near = cameras_of(subject, "body", 12, 128)[:8], cameras_of(subject, "body", 12, 128, 4)
+    assert [camera.name for camera in near] == [str(n) for n in range(12)]
+    for one, other in zip(cameras_of(subject, "body", 8, 128), near[:8], strict=True):
+        np.testing.assert_array_equal(one.world_to_camera, other.world_to_camera)
+        np.testing.assert_array_equal(one.intrinsics, other.intrinsics)
+    head, floor = subject.head_in_world, np.zeros(3)
+    for camera in near[8:]:
+        assert camera.intrinsics[0, 0] == pytest.approx(2.36 * far[0].intrinsics[0, 0])
+        pixels, depth = camera.project(np.stack([head, floor]))
+        assert (depth > 0).all() and (pixels[0] > 0).all() and pixels[0, 1] < camera.height / 2
+        assert pixels[1, 1] > camera.height
+    centers = np.stack([camera.camera_to_world[:3, 3] for camera in near[8:]])
+    assert np.degrees(np.arctan2(centers[:, 0], centers[:, 2])) == pytest.approx([-75, -25, 25, 75])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"near": 6}, "near (6) must be less than the number of cameras (6)"),
+        ({"near": -1}, "near (-1) must be less than"),
+        ({"near": 2, "rig": "head"}, "use --rig body"),
+        ({"manner": "grim"}, "there is no manner 'grim': use neutral or friendly"),
+    ],
+)
+def test_near_cameras_and_manners_that_make_no_sense_are_refused(person, tmp_path, changes, words):
+    with pytest.raises(SettingsError, match=re.escape(words)):
+        record(_settings(person, **changes), tmp_path / "out", 1)
+    assert not (tmp_path / "out").exists()
 
 
 def test_pictures_and_split_of_a_body(folder):

@@ -27,6 +27,9 @@ class Synthetic:
     shoulders (`bust`), or rings all around the whole person (`body`)."""
     cameras: int = 6
     """Number of cameras; the first stands in front."""
+    near_cameras: int = 0
+    """How many of the cameras of a whole person, the last ones, stand before the upper body and
+    show it alone, more than twice as large."""
     frames: int = 1100
     """Number of frames; for a head, the last 1/11 are test frames."""
     fps: float = 25.0
@@ -58,6 +61,9 @@ class Synthetic:
     gaze: Literal["visitor", "ahead"] = "visitor"
     """Where the person looks between glances: at who stands before the first camera, whatever the
     head does (`visitor`), or where the head points (`ahead`)."""
+    manner: Literal["neutral", "friendly"] = "neutral"
+    """How the face is all the time, whatever it says: as it is (`neutral`), or with a slight smile
+    of mouth and eyes (`friendly`)."""
     seed: int = 0
     """Seed of voice, order of sentences, blinks, brows, sway, gestures and choice of cameras."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -97,6 +103,8 @@ class Synthetic:
             self.garment,
             self.clothes,
             self.gaze,
+            self.manner,
+            self.near_cameras,
         )
         record(recording, self.out, self.workers)
         say(f"{self.frames} frames by {self.cameras} cameras lie in {self.out}")

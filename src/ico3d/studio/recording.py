@@ -23,6 +23,7 @@ from ico3d.errors import SettingsError
 from ico3d.studio.acting.embody import embodied
 from ico3d.studio.acting.gaze import GAZES, looking
 from ico3d.studio.acting.gestures import MOTIONS
+from ico3d.studio.acting.manner import MANNERS, mannered
 from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
 from ico3d.studio.dress.wearing import GARMENTS, dressed
 from ico3d.studio.person.choice import load_subject
@@ -59,6 +60,8 @@ class Recording:
         garment: Swinging garment that a whole person wears over the clothes, one of `GARMENTS`.
         clothes: What the person wears, one of `CLOTHES`.
         gaze: Where the person looks between glances, one of `GAZES`.
+        manner: How the face is all the time, one of `MANNERS`.
+        near: How many of the cameras of a whole person show the upper body alone.
     """
 
     subject: str
@@ -76,6 +79,8 @@ class Recording:
     garment: str = "none"
     clothes: str = "plain"
     gaze: str = "ahead"
+    manner: str = "neutral"
+    near: int = 0
 
     @property
     def whole(self) -> bool:
@@ -106,6 +111,7 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     acted = perform(
         subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
+    acted = mannered(subject, acted, recording.manner)
     if recording.whole:
         clear = recording.arms_clear
         acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed, clear)
@@ -113,7 +119,8 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     if recording.gaze == "visitor":
         ahead = BODY_DISTANCE if recording.whole else DISTANCE
         acted = looking(subject, acted, subject.head_in_world + np.array([0.0, 0.0, ahead]))
-    cameras = cameras_of(subject, recording.rig, recording.cameras, recording.size)
+    rig = (recording.rig, recording.cameras, recording.size, recording.near)
+    cameras = cameras_of(subject, *rig)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
     )
@@ -139,6 +146,7 @@ def _check(recording: Recording) -> None:
         "garment": GARMENTS,
         "clothes": CLOTHES,
         "gaze": GAZES,
+        "manner": tuple(MANNERS),
     }
     for name, known in choices.items():
         value = getattr(recording, name)
@@ -149,6 +157,13 @@ def _check(recording: Recording) -> None:
             raise SettingsError(f"{name} must be at least 1, not {getattr(recording, name)}.")
     if recording.garment != "none" and not recording.whole:
         raise SettingsError(f"only a whole person wears a {recording.garment}: use --rig body.")
+    if not 0 <= recording.near < recording.cameras:
+        raise SettingsError(
+            f"near ({recording.near}) must be less than the number of cameras "
+            f"({recording.cameras}), and 0 or more."
+        )
+    if recording.near and not recording.whole:
+        raise SettingsError("only cameras of a whole person may stand near: use --rig body.")
     if recording.views_per_frame > recording.cameras:
         raise SettingsError(
             f"views_per_frame ({recording.views_per_frame}) cannot exceed "

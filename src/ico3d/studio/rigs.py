@@ -31,6 +31,10 @@ ARCS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
 
 BODY = Framing(2.36, 1.05)
 """A person from the floor to above raised hands; `aim` is a height above the floor here."""
+UPPER_BODY = Framing(1.0, 1.27)
+"""From the hips to above the head; `aim` is a height above the floor here, too."""
+UPPER_ARC = 100.0
+"""Widest azimuth of cameras before an upper body, degrees to either side."""
 BODY_DISTANCE = 2.8
 ASPECT = 0.62
 """Width of a picture of a body divided by its height."""
@@ -39,7 +43,9 @@ RINGS = (-7.0, 5.0, 17.0)
 RIGS = (*ARCS, "body")
 
 
-def cameras_of(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:
+def cameras_of(
+    subject: Subject, rig: str, count: int, size: int, near: int = 0
+) -> tuple[Camera, ...]:
     """The cameras of a rig.
 
     Args:
@@ -47,9 +53,10 @@ def cameras_of(subject: Subject, rig: str, count: int, size: int) -> tuple[Camer
         rig: One of `RIGS`.
         count: Number of cameras.
         size: Height of the pictures in pixels; pictures of heads are square.
+        near: How many of the cameras of a whole person, the last ones, show the upper body alone.
     """
     if rig == "body":
-        return camera_rings(count, size)
+        return camera_rings(count - near, size) + cameras_before(near, size, count - near)
     return camera_arc(subject, rig, count, size)
 
 
@@ -60,17 +67,33 @@ def camera_rings(count: int, height: int) -> tuple[Camera, ...]:
         count: Number of cameras.
         height: Height of the pictures in pixels.
     """
+    elevations = [RINGS[(index + 1) % len(RINGS)] for index in range(count)]
+    ways = [_towards(360.0 * index / count, e) for index, e in enumerate(elevations)]
+    return tuple(_portrait_camera(BODY, way, height, i) for i, way in enumerate(ways))
+
+
+def cameras_before(count: int, height: int, first: int) -> tuple[Camera, ...]:
+    """Cameras on an arc before an upper body, which they show as large as their pictures allow.
+
+    Args:
+        count: Number of cameras.
+        height: Height of the pictures in pixels.
+        first: Number that the first of these cameras has as its name.
+    """
+    azimuths = UPPER_ARC * (2 * (np.arange(count) + 0.5) / max(count, 1) - 1)
+    elevations = [RINGS[(index + 1) % len(RINGS)] for index in range(count)]
+    ways = [_towards(a, e) for a, e in zip(azimuths, elevations, strict=True)]
+    return tuple(_portrait_camera(UPPER_BODY, way, height, first + i) for i, way in enumerate(ways))
+
+
+def _portrait_camera(framing: Framing, towards: np.ndarray, height: int, number: int) -> Camera:
+    """A camera beside a standing person, in the direction `towards` (3,) from them."""
     width = 2 * round(ASPECT * height / 2)
-    focal = height * BODY_DISTANCE / BODY.height
+    focal = height * BODY_DISTANCE / framing.height
     intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
-    target = np.array([0.0, BODY.aim, 0.0])
-    cameras = []
-    for index in range(count):
-        elevation = RINGS[(index + 1) % len(RINGS)]
-        towards = _towards(360.0 * index / count, elevation)
-        pose = look_at(target + BODY_DISTANCE * towards, target)
-        cameras.append(Camera(width, height, intrinsics, pose, str(index)))
-    return tuple(cameras)
+    target = np.array([0.0, framing.aim, 0.0])
+    pose = look_at(target + BODY_DISTANCE * towards, target)
+    return Camera(width, height, intrinsics, pose, str(number))
 
 
 def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:

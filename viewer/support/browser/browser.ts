@@ -122,11 +122,15 @@ export class Browser {
     return new Browser(context, await context.newPage());
   }
 
-  /** Opens the page and waits until the avatar is on stage. */
-  async open(url: string): Promise<Page> {
+  /**
+   * Opens the page and waits until the avatar is on stage.
+   *
+   * @param adapts whether the quality of pictures follows their rate, as for visitors; else it is the best
+   */
+  async open(url: string, adapts = false): Promise<Page> {
     await this.page.goto(url, { timeout: 60_000 });
     await this.page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
-    await this.page.evaluate(() => window.ico3d!.stage.holdQuality(0)); // software rendering is slow
+    if (!adapts) await this.page.evaluate(() => window.ico3d!.stage.holdQuality(0)); // software rendering is slow
     return this.page;
   }
 

@@ -18,7 +18,7 @@ HEAD_MAP = (448, 0.24)
 
 Everything outside of the map counts as lit.
 """
-SCALP_REACH = 0.012
+SCALP_REACH = 0.022
 """Distance in metres from the hairline over which roots come to cover the skin."""
 
 
@@ -125,4 +125,4 @@ def _scalp(subject: Subject) -> np.ndarray:
     if skull is None:
         return np.zeros(len(subject.vertices))
     depth = skull.inside_hairline(subject.vertices)
-    return np.clip(0.3 + depth / SCALP_REACH, 0, 1) ** 1.5
+    return np.clip(0.25 + depth / SCALP_REACH, 0, 1) ** 1.5

@@ -166,9 +166,12 @@ class Watcher:
             body = reader.body(part.cut(image))
         if body is None:
             return 0
-        camera = self.seen.cameras[place]
-        self.seen.pixels[frame, place, POSE] = part.whole(body.pixels)
-        self.seen.weights[frame, place, POSE] = body.visibility * np.where(COARSE, COARSE_HAND, 1)
+        camera, pixels = self.seen.cameras[place], part.whole(body.pixels)
+        # The model guesses where limbs would be that the picture cuts off.
+        shown = ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(1)  # (33,)
+        sure = body.visibility * np.where(COARSE, COARSE_HAND, 1) * shown
+        self.seen.pixels[frame, place, POSE] = pixels
+        self.seen.weights[frame, place, POSE] = sure
         self.seen.relative[frame, place] = body.relative @ camera.world_to_camera[:3, :3]
         return 1
 

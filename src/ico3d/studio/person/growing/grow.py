@@ -16,8 +16,8 @@ TAIL = 3600
 """Strands in a tail."""
 RADIUS = 0.00013
 """Half of a strand's thickness in metres: thicker than real hair, which is more numerous."""
-EDGE = 0.007
-"""Metres over which the hairline thins out."""
+EDGE = 0.015
+"""Metres over which the hairline thins out: the strands there are fewer and finer."""
 AWAY = 0.03
 """Hair farther than this from the skin hangs in a tail, metres."""
 
@@ -81,7 +81,7 @@ def _of(
 ) -> Strands:
     """Binds hair whose roots lie `inside` (N,) metres from the hairline, where it is finer."""
     tone = np.exp(random.normal(0, 0.22, len(corners)))
-    fine = 0.55 + 0.45 * styles.smooth(-0.002, 0.015, inside)
+    fine = 0.35 + 0.65 * styles.smooth(-0.004, EDGE, inside)
     return bound(
         subject.vertices,
         corners,
@@ -108,8 +108,9 @@ def _roots(
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     parts = np.stack([1 - u - v, u, v], 1)
     places = np.einsum("nk,nkc->nc", parts, at[chosen])
-    depth = skull.inside_hairline(places) + 0.003 * _ripple(places)
-    kept = np.flatnonzero(random.random(2 * count) < np.clip(0.35 + depth / EDGE, 0, 1))[:count]
+    depth = skull.inside_hairline(places) + 0.004 * _ripple(places)
+    dense = np.clip(0.35 + depth / EDGE, 0, 1) ** 1.5  # (2 count,)
+    kept = np.flatnonzero(random.random(2 * count) < dense)[:count]
     return skin[chosen[kept]], parts[kept]
 
 

@@ -1,0 +1,48 @@
+"""A friendly person smiles all the time, and still speaks, blinks and closes the lips."""
+
+import numpy as np
+import pytest
+
+from ico3d.studio.acting.manner import MANNERS, mannered
+from ico3d.studio.acting.performance import perform
+from ico3d.studio.person.choice import load_subject
+from support.needs import needs
+
+pytestmark = needs("anny")
+
+
+@pytest.fixture(scope="module")
+def anny():
+    return load_subject("anny")
+
+
+@pytest.fixture(scope="module")
+def acted(anny):
+    return perform(anny, "Bob may pop by.", 75, 25.0, 0, False)
+
+
+def test_a_neutral_person_does_what_was_acted(anny, acted):
+    assert mannered(anny, acted, "neutral") is acted
+
+
+def test_a_friendly_person_smiles_in_every_frame_and_does_the_same_otherwise(anny, acted):
+    friendly = mannered(anny, acted, "friendly")
+    names = anny.blendshape_names
+    for column, name in enumerate(names):
+        added = MANNERS["friendly"].get(name, 0.0)
+        wanted = np.minimum(acted.weights[:, column] + np.float32(added), 1)
+        np.testing.assert_array_equal(friendly.weights[:, column], wanted)
+    smile = names.index("mouthSmileLeft")
+    assert (friendly.weights[:, smile] >= acted.weights[:, smile] + 0.3).all()
+    np.testing.assert_array_equal(friendly.eyes, acted.eyes)
+    np.testing.assert_array_equal(friendly.samples, acted.samples)
+    assert friendly.weights.dtype == acted.weights.dtype
+
+
+def test_a_smile_keeps_lips_closed_at_bilabials(anny):
+    smile = anny.weights(MANNERS["friendly"])
+    gaps = {}
+    for viseme in ("PP", "aa"):
+        marks = anny.landmarks(anny.posed(np.minimum(anny.visemes[viseme] + smile, 1)))
+        gaps[viseme] = np.linalg.norm(marks[62] - marks[66])
+    assert gaps["PP"] < 0.003 and gaps["aa"] > 0.012
