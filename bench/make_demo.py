@@ -50,6 +50,7 @@ class Shot:
         views: Number of cameras that take each frame.
         size: Height of the pictures.
         fps: Frames per second.
+        near: How many of the cameras of a whole person show the upper body alone.
     """
 
     cameras: int
@@ -57,17 +58,19 @@ class Shot:
     views: int
     size: int
     fps: float
+    near: int = 0
 
     def words(self) -> tuple[object, ...]:
         """The options of ico3d capture synthetic."""
         size = ("--frames", self.frames, "--size", self.size, "--fps", self.fps)
-        return ("--cameras", self.cameras, "--views-per-frame", self.views, *size)
+        near = ("--near-cameras", self.near)
+        return ("--cameras", self.cameras, "--views-per-frame", self.views, *near, *size)
 
 
 HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=25)
 """A minute of talk, each frame from another side."""
-BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4)
-"""25 s, in which hands, head and feet do everything once."""
+BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=8)
+"""25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
 )
@@ -139,14 +142,15 @@ class Demo:
             f"time each: {left * each / 3600:.1f} h.",
             flush=True,
         )
-        who = ("--subject", self.subject, "--seed", self.seed, "--no-lively", "--rig", rig)
+        who = ("--subject", self.subject, "--seed", self.seed, "--rig", rig)
+        who = (*who, "--no-lively", "--manner", "friendly")
         ico3d("capture synthetic", capture, *who, *shot.words(), *more, "--workers", self.threads)
 
     def _seconds_of_a_picture(self, rig: str, shot: Shot) -> float:
         """Processor time of a picture and its share of what a frame takes, from a few pictures."""
         person = load_subject(str(self.subject), rig == "body")
         studio = Studio(person, STUDIOS["studio"], "plain")
-        cameras = cameras_of(person, rig, shot.cameras, shot.size)[:TRIED]
+        cameras = cameras_of(person, rig, shot.cameras, shot.size, shot.near)[-TRIED:]
         pose = np.eye(4)
         pose[:3, 3] = person.head_in_world
         vertices = person.vertices.astype(np.float32)
@@ -165,6 +169,8 @@ class Demo:
         if not head.exists():
             ico3d("train head", capture, head, *options, "--dry-run")  # says how long it takes
         ico3d("train head", capture, head, *options)
+        if not (head / "metrics.json").exists():
+            ico3d("evaluate", head, capture, "--json", head / "metrics.json")
 
 
 def check(path: Path) -> None:

@@ -12,8 +12,7 @@ class Ico3dError(Exception):
 
         Sentences quote names and values from files that anybody may have made.
         """
-        text = super().__str__()
-        shown = text if text.isprintable() else "".join(map(_shown, text))
+        shown = printable(super().__str__())
         if len(shown) <= MOST_LETTERS:
             return shown
         return f"{shown[: MOST_LETTERS // 2]} … {shown[-MOST_LETTERS // 2 :]}"
@@ -21,6 +20,14 @@ class Ico3dError(Exception):
     def __reduce__(self):
         """Travels between processes as its sentence, whatever its constructor takes."""
         return _again, (type(self), self.args), self.__dict__
+
+
+def printable(text: str) -> str:
+    """A text on one line, with escapes in the place of characters that a terminal obeys.
+
+    What stands in others' files, and names of these, is printed by this.
+    """
+    return text if text.isprintable() else "".join(map(_shown, text))
 
 
 def _shown(character: str) -> str:

@@ -2,14 +2,17 @@
 
 import json
 import zipfile
+from dataclasses import replace
 
 import pytest
 
 from ico3d.bundle import packaged
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import Bundle, write_bundle
+from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
 from ico3d.errors import BundleError
 from support.bundles.random_body import write_random_body
+from support.bundles.random_bundle import random_files, random_head, random_manifest
 from support.bundles.random_whole import write_random_whole
 
 
@@ -64,3 +67,14 @@ def test_demo_is_the_packaged_one(tmp_path, monkeypatch):
     write_random_whole(tmp_path / "packaged.ico3d")
     assert Bundle.open("demo").manifest.name == "random person"
     assert info("demo", tmp_path)["bytes"] == (tmp_path / "packaged.ico3d").stat().st_size
+
+
+def test_a_terminal_obeys_nothing_that_a_bundle_says(tmp_path, capsys):
+    head = random_head(10)
+    provenance = Provenance("\x1b]0;x\x07", ("a\nfiles  none",), "agreed", "CC0-1.0", "\u202eAda")
+    manifest = replace(random_manifest(head), provenance=provenance)
+    write_bundle(tmp_path / "a.ico3d", manifest, random_files(head))
+    assert main(["bundle", "info", str(tmp_path / "a.ico3d")]) == 0
+    told = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("provenance"))
+    assert r"kind: \x1b]0;x\x07, sources: a\nfiles  none, consent: agreed" in told
+    assert r"likeness: \u202eAda" in told

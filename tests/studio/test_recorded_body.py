@@ -245,7 +245,7 @@ def test_near_cameras_show_the_upper_body_larger(subject):
         np.testing.assert_array_equal(one.intrinsics, other.intrinsics)
     head, floor = subject.head_in_world, np.zeros(3)
     for camera in near[8:]:
-        assert camera.intrinsics[0, 0] == pytest.approx(2.36 * far[0].intrinsics[0, 0])
+        assert camera.intrinsics[0, 0] == pytest.approx(2.36 / 0.9 * far[0].intrinsics[0, 0])
         pixels, depth = camera.project(np.stack([head, floor]))
         assert (depth > 0).all() and (pixels[0] > 0).all() and pixels[0, 1] < camera.height / 2
         assert pixels[1, 1] > camera.height

@@ -35,6 +35,7 @@ class Info:
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.packaged import bundle_path
         from ico3d.common.files import write_atomic
+        from ico3d.errors import printable
 
         found = figures(Bundle.open(self.bundle), bundle_path(self.bundle))
         if self.json is not None:
@@ -42,7 +43,7 @@ class Info:
         console = Console(highlight=False, soft_wrap=True)
         for name, value in found.items():
             if value is not None:
-                console.print(f"{name:18} {_line(value)}", markup=False)
+                console.print(printable(f"{name:18} {_line(value)}"), markup=False)
 
 
 def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import tyro
 
 from ico3d.bundle import packaged
 from ico3d.chat.observing.operator_log import set_up_log
-from ico3d.errors import SettingsError
+from ico3d.errors import SettingsError, printable
 
 if TYPE_CHECKING:
     from ico3d.chat.settings.embedding import Embedding
@@ -114,7 +114,7 @@ class Serve:
         url = server.address(listener, reach.scheme)
         listener.listen()  # whoever reads the address and comes at once is served in a moment
         name = (persona or bundle.manifest.persona).name
-        print(f"{name} is at {url}{fragment(key)} (Ctrl+C ends)")
+        print(f"{printable(name)} is at {url}{fragment(key)} (Ctrl+C ends)")
         print("\n".join(reach.told(listener.getsockname()[1], key)))
         if figures:
             print(f"Prometheus finds figures at {figures}")

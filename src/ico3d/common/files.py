@@ -1,18 +1,22 @@
-"""Writing files so that a crash never leaves half of one."""
+"""Writes files so that a crash never leaves half of one; reads small ones of anybody."""
 
 import errno
+import json
 import os
 import re
 import secrets
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from ico3d.errors import StorageError
 
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 """Names that `write_atomic` gives to unfinished files."""
 
+MOST_NOTES = 64 << 20
+"""Bytes of a file of JSON that `read_object` reads."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a system says when a disk, a quota or the limit of a file's size is reached."""
@@ -75,6 +79,20 @@ def remove_unfinished(folder: Path) -> None:
     for path in folder.iterdir():
         if _TEMPORARY.fullmatch(path.name):
             path.unlink()
+
+
+def read_object(file: Path) -> dict[str, Any]:
+    """The object in a file of JSON, which may be anybody's; empty where there is none.
+
+    Nothing is read that has no end, such as what a link to a device leads to.
+    """
+    try:
+        if not file.is_file() or file.stat().st_size > MOST_NOTES:
+            return {}
+        content = json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def _sync_folder(folder: Path) -> None:

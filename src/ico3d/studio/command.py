@@ -29,7 +29,7 @@ class Synthetic:
     """Number of cameras; the first stands in front."""
     near_cameras: int = 0
     """How many of the cameras of a whole person, the last ones, stand before the upper body and
-    show it alone, more than twice as large."""
+    show it alone, 2.6 times as large."""
     frames: int = 1100
     """Number of frames; for a head, the last 1/11 are test frames."""
     fps: float = 25.0

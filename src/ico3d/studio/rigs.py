@@ -31,7 +31,7 @@ ARCS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
 
 BODY = Framing(2.36, 1.05)
 """A person from the floor to above raised hands; `aim` is a height above the floor here."""
-UPPER_BODY = Framing(1.0, 1.27)
+UPPER_BODY = Framing(0.9, 1.31)
 """From the hips to above the head; `aim` is a height above the floor here, too."""
 UPPER_ARC = 100.0
 """Widest azimuth of cameras before an upper body, degrees to either side."""

@@ -190,3 +190,27 @@ def test_what_the_studio_page_recorded_is_found_by_name(project):
     bundle(folder / "Ada.ico3d", "Ada")
     assert main(["forget", "Ada", "--yes"]) == 0
     assert not folder.exists()
+
+
+def test_a_strangers_folder_does_not_keep_anybody_from_being_forgotten(tmp_path, capsys):
+    work = tmp_path / "work"
+    ada = bundle_in(work / "a", "Ada")
+    stranger = model(work / "b")
+    (stranger / "settings.json").write_text("[" * 100_000)
+    (model(work / "c") / "head.json").write_text('{"summary": 3}')
+    (model(work / "d") / "head.json").symlink_to("/dev/zero")
+    assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
+    assert not ada.exists() and stranger.exists()
+
+
+def test_a_terminal_obeys_nothing_that_a_bundle_says(tmp_path, capsys):
+    bundle_in(tmp_path / "a", "Ada\x1b[2J\x1b[8m")
+    said = ["forget", str(tmp_path / "a/a.ico3d"), "--project", str(tmp_path)]
+    assert main(said) == 1
+    printed = capsys.readouterr().out
+    assert printed == f"{tmp_path}/a/a.ico3d: a bundle of Ada\\x1b[2J\\x1b[8m\n"
+
+
+def bundle_in(folder: Path, likeness: str) -> Path:
+    folder.mkdir(parents=True)
+    return bundle(folder / "a.ico3d", likeness)

@@ -60,6 +60,44 @@ async def test_whisper_recognises_every_word_of_people(recording, words):
     assert re.sub(r"[^a-z ]", "", frames[0].text.lower()) == words
 
 
+@pytest.mark.skipif(not SPEECH.is_dir(), reason="the recordings are not here")
+@pytest.mark.parametrize("noise", [3e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("pauses", [(0.3, 0.2), (0.6, 0.5)])
+@pytest.mark.parametrize(
+    ("recording", "part", "words"),
+    [
+        ("arctic_a0024", slice(None), "it was my reports from the north which chiefly induced"),
+        ("new-home-in-the-stars-16k", slice(None), "we must find a new home in the stars"),
+        ("jfk_16k", slice(52800), "and so my fellow americans"),
+        ("jfk_16k", slice(126400, None), "ask what you can do for your country"),
+    ],
+)
+def test_people_in_a_quiet_room_are_heard_at_once(
+    recording, part, words, pauses, noise, monkeypatch
+):
+    from faster_whisper import WhisperModel
+
+    passes, transcribe = [], WhisperModel.transcribe
+
+    def counted(model, *sound, **options):
+        passes.append(options)
+        return transcribe(model, *sound, **options)
+
+    monkeypatch.setattr(WhisperModel, "transcribe", counted)
+    with wave.open(str(SPEECH / f"{recording}.wav")) as file:
+        pcm = np.frombuffer(file.readframes(file.getnframes()), np.int16)[part]
+    before, after = (np.zeros(int(16000 * seconds), np.float32) for seconds in pauses)
+    sound = np.concatenate([before, pcm.astype(np.float32) / 32768, after])
+    sound += noise * np.random.default_rng(0).standard_normal(len(sound)).astype(np.float32)
+    folder = whisper.find(whisper.Settings("tiny.en"))
+    segments, _ = whisper.load(folder, "cpu", "int8").transcribe(
+        sound, temperature=0.0, language="en"
+    )
+    said = re.sub(r"[^a-z ]", "", " ".join(s.text for s in segments).lower()).strip()
+    assert said.startswith(words) and len(said) < 2 * len(words)
+    assert len(passes) == 1  # nothing looked like a loop
+
+
 def model():
     return smollm.make(smollm.Settings(), IRIS)
 

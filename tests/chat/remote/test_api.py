@@ -12,6 +12,7 @@ import pytest
 from pipecat.frames.frames import ErrorFrame, LLMContextFrame, LLMTextFrame
 from pipecat.processors.frame_processor import FrameProcessor
 
+from ico3d.chat.remote import door
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.remote.recognition import read_wav
 from ico3d.chat.services.voice import espeak
@@ -211,3 +212,20 @@ async def test_more_requests_than_allowed_are_told_to_wait():
         assert second.status_code == 429 and second.headers["retry-after"] == "1"
         assert (await first).status_code == 504
         assert json.loads((await plain.get("/health")).text)["ok"]
+
+
+async def test_a_request_that_never_comes_gives_its_place_back(monkeypatch):
+    monkeypatch.setattr(door, "SILENCE", 0.5)
+    ask = {"messages": [{"role": "user", "content": "who are you"}]}
+    async with serving(service_app("language", make_language, Limits(requests=1))) as url:
+        address = httpx.URL(url)
+        reader, writer = await asyncio.open_connection(address.host, address.port)
+        head = "POST /v1/chat/completions HTTP/1.1", f"Host: {address.netloc.decode()}"
+        kind = "Content-Type: application/json", "Content-Length: 1000"
+        writer.write("\r\n".join((*head, *kind, "", "{")).encode())
+        await asyncio.sleep(0.2)
+        async with httpx.AsyncClient(base_url=url) as http:
+            assert (await http.post("v1/chat/completions", json=ask)).status_code == 429
+            assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
+            assert (await http.post("v1/chat/completions", json=ask)).status_code == 200
+        writer.close()

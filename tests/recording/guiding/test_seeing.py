@@ -135,3 +135,13 @@ def test_turns_by_name():
         None,
         None,
     ]
+
+
+def test_a_picture_of_thousands_of_passes_is_not_decoded(eye):
+    written = io.BytesIO()
+    Image.new("RGB", (640, 480)).save(written, "JPEG", progressive=True)
+    whole = written.getvalue()
+    last = whole[whole.rfind(b"\xff\xda") : -2]
+    assert eye.told(whole, None) is not None
+    with pytest.raises(Refused, match="unusual form"):
+        eye.told(whole[:-2] + last * 1000 + whole[-2:], None)

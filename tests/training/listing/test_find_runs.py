@@ -184,3 +184,39 @@ def test_ages_and_sizes(project):
     assert run.size == sum(file.stat().st_size for file in files)
     (line,) = lines(run, run.changed + 3 * 3600 + 1)
     assert line == f"{run.path}: head, step 20 of 20, finished, 3 h ago, 1.5 MB"
+
+
+def notes_of(folder, **changes):
+    """The notes of an interrupted run that somebody else wrote."""
+    folder.mkdir()
+    (folder / "settings.json").write_text(json.dumps(HEAD))
+    told = {"command": [], "folder": "/", "path": "/", "steps": 20, "failed": None, "done": False}
+    (folder / "state.json").write_text(json.dumps(told | changes))
+
+
+def test_another_program_is_no_command_to_go_on_with(tmp_path):
+    notes_of(tmp_path / "a", command=["sh", "-c", "rm -rf ~"])
+    assert found(tmp_path)["a"] == ("head", 0, 20, "interrupted", "", "")
+
+
+def test_a_terminal_obeys_nothing_that_notes_say(tmp_path, capsys):
+    notes_of(tmp_path / "a", command=["ico3d", "train\x1b[8m"], failed="\x1b]0;x\x07\n\u202eno")
+    assert main(["runs", str(tmp_path)]) == 0
+    first, reason, command = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"{tmp_path}/a: head, step 0 of 20, failed")
+    assert reason == r"  \x1b]0;x\x07\n\u202eno"
+    assert command.endswith(r"ico3d train\x1b[8m'") or command.endswith(r"ico3d 'train\x1b[8m'")
+
+
+@pytest.mark.parametrize("steps", ["1e400", "[" * 100_000])
+def test_notes_that_break_parsers_are_none(tmp_path, steps):
+    notes_of(tmp_path / "a")
+    state = tmp_path / "a/state.json"
+    state.write_text(state.read_text().replace("20", steps))
+    assert found(tmp_path)["a"] == ("head", 0, 20, "interrupted", "", "")
+    (tmp_path / "a/settings.json").write_text("[" * 100_000)
+    assert found(tmp_path)["a"] == ("unknown", 0, None, "damaged", REASON(tmp_path), "")
+
+
+def REASON(folder):
+    return f"{folder / 'a/settings.json'} cannot be read."

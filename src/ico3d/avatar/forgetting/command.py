@@ -44,6 +44,7 @@ class Forget:
         from ico3d.avatar.forgetting.choosing import belonging, outermost, remaining
         from ico3d.avatar.forgetting.holdings import find_holdings
         from ico3d.avatar.forgetting.removal import remove, with_tracks
+        from ico3d.errors import printable
 
         console = Console(highlight=False, soft_wrap=True, markup=False)
         project = Path(os.path.abspath(self.project))
@@ -54,12 +55,12 @@ class Forget:
         if not theirs:
             raise self._nobody(holdings)
         for path in theirs:
-            console.print(f"{path}{_described(path, chosen)}")
+            console.print(printable(f"{path}{_described(path, chosen)}"))
         self._ask(len(theirs))
         targets = remove(theirs)
         console.print(f"{len(theirs)} removed. What may remain elsewhere, and is not removed:")
         for sentence in (*targets, *remaining(holdings, chosen, theirs)):
-            console.print(f"- {sentence}")
+            console.print(printable(f"- {sentence}"))
 
     def _meant(self, project: Path) -> tuple[list[Path], set[str]]:
         """The paths, absolute, and the names in small letters that are named."""

@@ -1,16 +1,15 @@
 """What a project folder holds of people: recordings, models, runs, bundles, and whose they are."""
 
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ico3d.avatar.models import KINDS
 from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST, Manifest
+from ico3d.common.files import read_object
 from ico3d.common.people.stated import BETWEEN, NOBODY, is_stated
 from ico3d.errors import Ico3dError
 
@@ -88,11 +87,11 @@ def _folder(folder: Path) -> Holding | None:
         return _recording(folder, about)
     if (folder / MANIFEST).is_file():
         return _bundle(folder)
-    run, models = _json(folder / RUN), [_json(folder / name) for name in MODELS]
+    run, models = read_object(folder / RUN), [read_object(folder / name) for name in MODELS]
     if not any(models) and "capture" not in run:
         return None
     made_of = [Path(run[name]) for name in MADE_OF if isinstance(run.get(name), str)]
-    parts = [model.get("summary", {}) for model in models]
+    parts = [part for model in models if isinstance(part := model.get("summary"), dict)]
     stated = [part.get(key, {}) for part in parts for key in ("capture", "head", "body")]
     names = [about.get("likeness", "") for about in stated if isinstance(about, dict)]
     what = "a model" if any(models) else "an unfinished training"
@@ -100,7 +99,7 @@ def _folder(folder: Path) -> Holding | None:
 
 
 def _recording(folder: Path, file: str) -> Holding:
-    known = _json(folder / file)
+    known = read_object(folder / file)
     about = known.get("provenance", known)
     about = about if isinstance(about, dict) else {}
     sources = about.get("sources", ())
@@ -121,12 +120,3 @@ def _named(*likenesses: str) -> tuple[str, ...]:
     """Each person once, of texts that may name several."""
     names = (name.strip() for text in likenesses for name in text.split(BETWEEN))
     return tuple(dict.fromkeys(name for name in names if is_stated(name)))
-
-
-def _json(file: Path) -> dict[str, Any]:
-    """The content of a JSON file; empty where there is none that can be read."""
-    try:
-        content = json.loads(file.read_text("utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}

@@ -15,7 +15,7 @@ from ico3d.capture.finding import Finding
 from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import NOT_STATED, is_stated
 from ico3d.common.spread import spread
-from ico3d.errors import CaptureError
+from ico3d.errors import CaptureError, printable
 
 SHOWN = 17
 """Number of pictures on the contact sheet, three rows together with the background."""
@@ -211,7 +211,9 @@ def report(capture: Capture, sheet: Path) -> None:
     table = Table("", "", "finding", title=f"{capture.kind}: {capture.path}", title_justify="left")
     colours = {"ok": "green", "warn": "yellow", "error": "red"}
     for finding in findings:
-        table.add_row(finding.what, Text(finding.level, colours[finding.level]), finding.text)
+        table.add_row(
+            finding.what, Text(finding.level, colours[finding.level]), printable(finding.text)
+        )
     Console().print(table)
     wrong = [finding for finding in findings if finding.level == "error"]
     if wrong:

@@ -5,6 +5,8 @@ from typing import Literal
 
 from rich.text import Text
 
+from ico3d.errors import printable
+
 Grade = Literal["good", "weak", "bad"]
 MARKS: dict[Grade, tuple[str, str]] = {
     "good": ("✓", "green"),
@@ -32,7 +34,7 @@ class Finding:
         """The finding for a terminal."""
         mark, colour = MARKS[self.grade]
         told = f"{self.what}: {self.mend}" if self.mend else self.what
-        return Text.assemble((mark, colour), f" {told}")
+        return Text.assemble((mark, colour), f" {printable(told)}")
 
 
 def good(what: str) -> Finding:

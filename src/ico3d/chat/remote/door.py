@@ -1,5 +1,6 @@
 """Admission of requests to a module: key, size, and number at a time."""
 
+import asyncio
 import hmac
 
 from starlette.datastructures import Headers
@@ -9,6 +10,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from ico3d.chat.remote.limits import Limits
 
 OPEN_PATHS = ("/health",)
+SILENCE = 10.0
+"""Seconds without a byte after which a request that is not whole is given up."""
 BROKEN, BUSY = 1008, 1013  # WebSocket close codes
 
 
@@ -31,7 +34,7 @@ class Door:
             return
         self._inside += 1
         try:
-            body = Body(self._limits.megabytes, scope, receive, send)
+            body = Body(self._limits, scope, receive, send)
             await self._app(scope, body.receive, body.send)
         finally:
             self._inside -= 1
@@ -49,17 +52,23 @@ class Door:
 
 
 class Body:
-    """A request whose bytes are counted as they arrive, since headers may omit the length."""
+    """A request that is bounded as it arrives: headers may omit the length, or nothing may come."""
 
-    def __init__(self, megabytes: float, scope: Scope, receive: Receive, send: Send):
-        """Counts the bytes from `receive`, up to `megabytes`; answers through `send`."""
-        self._megabytes, self._scope = megabytes, scope
+    def __init__(self, limits: Limits, scope: Scope, receive: Receive, send: Send):
+        """Bounds what `receive` brings; answers through `send`."""
+        self._megabytes, self._scope = limits.megabytes, scope
+        self._end = asyncio.get_running_loop().time() + limits.seconds
+        self._is_whole = scope["type"] != "http"
         self._receive, self._send = receive, send
         self._taken, self._refused = 0, False
 
     async def receive(self) -> Message:
-        """The next message; beyond the limit, a message that the client has disconnected."""
-        message = await self._receive()
+        """The next message; beyond the limits, a message that the client has disconnected."""
+        try:
+            message = await asyncio.wait_for(self._receive(), self._patience())
+        except TimeoutError:
+            return {"type": "http.disconnect"}
+        self._is_whole = self._is_whole or not message.get("more_body", False)
         self._taken += len(message.get("body", b""))
         return {"type": "http.disconnect"} if self._is_over else message
 
@@ -71,6 +80,11 @@ class Body:
             self._refused = True
             refusal = error_response(413, too_large(self._megabytes))
             await refusal(self._scope, self._receive, self._send)
+
+    def _patience(self) -> float | None:
+        """Seconds in which more has to come; None where all is here."""
+        left = self._end - asyncio.get_running_loop().time()
+        return None if self._is_whole else min(SILENCE, left)
 
     @property
     def _is_over(self) -> bool:

@@ -26,6 +26,8 @@ MOST_SIDE = 2000
 """Largest side of a picture that a page may send."""
 RATE = 3.0
 """Pictures per second of a part that are looked at."""
+MOST_SCANS = 64
+"""Passes over a JPEG picture; a small file of thousands of them takes minutes to decode."""
 MIDDLE = 0.3
 """Share of a picture at each edge that is left out where nobody knows where the face is."""
 OF_A_WHOLE = ("turns", "length", "lips", "exposure", "camera")
@@ -162,6 +164,8 @@ def _of_consent(file: Path) -> dict[str, Any]:
 
 def _decoded(jpeg: bytes) -> np.ndarray:
     """(H, W, 3) uint8 RGB."""
+    if jpeg.count(b"\xff\xda") > MOST_SCANS:
+        raise Refused("picture", "the picture has an unusual form.", 422)
     try:
         with Image.open(io.BytesIO(jpeg), formats=["JPEG"]) as image:
             if max(image.size) > MOST_SIDE or min(image.size) < 32:

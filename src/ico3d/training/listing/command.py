@@ -33,7 +33,7 @@ class Runs:
 
         from rich.console import Console
 
-        from ico3d.errors import SettingsError
+        from ico3d.errors import SettingsError, printable
         from ico3d.training.listing.find_runs import find_runs
 
         if not self.folder.is_dir():
@@ -42,7 +42,7 @@ class Runs:
         runs = find_runs(self.folder)
         for run in runs:
             for line in lines(run, time.time()):
-                console.print(line)
+                console.print(printable(line))
         if not runs:
             console.print(f"no trainings in {self.folder.resolve()} or below.")
 

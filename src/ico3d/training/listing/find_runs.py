@@ -1,6 +1,5 @@
 """Finds runs in a folder and below it, and tells of each how far it is and how it goes on."""
 
-import json
 import os
 import shlex
 from collections.abc import Iterator
@@ -9,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from ico3d.common.files import read_object
 from ico3d.errors import ModelError
 from ico3d.training.log import METRICS, latest_entry
 from ico3d.training.notes.lock import is_locked
@@ -26,6 +26,8 @@ KINDS = {
 }
 """What is made, by the first of these entries that a marking file has."""
 LOST = "No other checkpoint can be used: put a copy there, or move it away to begin afresh."
+PROGRAM = "ico3d"
+"""The only program that a run is said to go on by."""
 State = Literal["finished", "running", "interrupted", "failed", "damaged"]
 
 
@@ -178,7 +180,7 @@ def _judged(node: _Node) -> tuple[State, str]:
 def _command(node: _Node) -> str:
     """The command by which a run goes on, where it now is."""
     state, now = node.state, str(node.path.resolve())
-    if not state.command:
+    if state.command[:1] != (PROGRAM,):  # whoever wrote the notes may want another one run
         return ""
     words = list(state.command)
     if now != state.path:
@@ -223,7 +225,7 @@ def _node(folder: Path) -> _Node | None:
     for name, lock in ABOUT.items():
         if not (folder / name).is_file():
             continue
-        about = _json(folder / name)
+        about = read_object(folder / name)
         kind = next((kind for entry, kind in KINDS.items() if entry in about), None)
         if kind is None and not about and _has_trained(folder):
             kind = "unknown"
@@ -242,12 +244,3 @@ def _expected(about: dict, kind: str) -> int | None:
     settings = about.get("settings")
     steps = settings.get("steps") if isinstance(settings, dict) else None
     return steps if kind in ("head", "scene") and isinstance(steps, int) else None
-
-
-def _json(file: Path) -> dict:
-    """The content of a JSON file; empty where it cannot be read."""
-    try:
-        content = json.loads(file.read_text("utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_object, write_atomic
 from ico3d.errors import Ico3dError, StorageError
 
 STATE = "state.json"
@@ -100,7 +100,7 @@ def note(folder: Path, /, **changes: Any) -> None:
 def read_state(folder: Path) -> RunState:
     """The notes of a run; empty ones where there are none that can be read."""
     try:
-        told = json.loads((folder / STATE).read_text("utf-8"))
+        told = read_object(folder / STATE)
         return RunState(
             tuple(map(str, told["command"])),
             str(told["folder"]),
@@ -109,5 +109,5 @@ def read_state(folder: Path) -> RunState:
             None if told["failed"] is None else str(told["failed"]),
             bool(told["done"]),
         )
-    except (OSError, ValueError, LookupError, TypeError):
+    except (ValueError, LookupError, TypeError, OverflowError):
         return RunState()

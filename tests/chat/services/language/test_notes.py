@@ -1,5 +1,7 @@
 """The persona's notes: other words and misheard ones find the answer, foreign ones do not."""
 
+import time
+
 import pytest
 
 from ico3d.bundle.manifest import Persona
@@ -135,3 +137,11 @@ def test_a_language_model_is_told_who_it_is():
     assert "Never talk about these topics: politics or elections; age." in told
     assert told.endswith("who are you => I am Ada.\nThe museum closes at six.")
     assert "topics" not in instruction(Persona("Ada")) and "know" not in instruction(Persona("Ada"))
+
+
+@pytest.mark.parametrize("said", ["\ufdfa" * 2000, "a b " * 4_000_000])
+def test_a_long_question_holds_nobody_up(said):
+    notes = Notes(Persona("Ada", "", tuple(f"question {n} | other {n} => {n}" for n in range(200))))
+    begun = time.process_time()
+    assert notes.answer(said).startswith("I do not know that.")
+    assert time.process_time() - begun < 1  # a letter that stands for 18 took seconds

@@ -126,3 +126,34 @@ def test_a_device_that_is_not_there_is_one_sentence(german):
     with pytest.raises(SettingsError, match="cannot be used on cpu with int4") as error:
         make(settings, NOBODY)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("filled", "encoded"), [(0, 1000), (250, 1000), (850, 1050), (2900, 3000), (3000, 3000)]
+)
+def test_a_window_is_as_long_as_needed_and_its_filling_is_silence(filled, encoded):
+    from ico3d.chat.services.recognition.short_whisper import shortened
+
+    window = np.zeros((80, 3000), np.float32)  # as faster-whisper fills windows
+    window[:, :filled] = np.random.default_rng(0).uniform(-0.8, 1.2, (80, filled))
+    given = window.copy()
+    found = shortened(window)
+    assert found.shape == (80, encoded)
+    np.testing.assert_array_equal(found[:, :filled], given[:, :filled])
+    assert (found[:, filled:] == given[:, :filled].min(initial=0.0)).all()
+    np.testing.assert_array_equal(window, given)
+    np.testing.assert_array_equal(shortened(window[None])[0], found)
+
+
+def test_a_core_is_left_to_others(german, monkeypatch):
+    seen = {}
+
+    class Watched:
+        def __init__(self, folder, device, **options):
+            seen.update(options)
+
+    monkeypatch.setattr("ico3d.chat.services.recognition.short_whisper.ShortWhisper", Watched)
+    for cores, threads in ((1, 1), (2, 1), (4, 3), (64, 4), (None, 1)):
+        monkeypatch.setattr(whisper.os, "cpu_count", lambda cores=cores: cores)
+        whisper.load.__wrapped__(german, "cpu", "int8")
+        assert seen["cpu_threads"] == threads

@@ -1,5 +1,7 @@
 """How an answer is cut while it is being written."""
 
+import time
+
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -157,3 +159,12 @@ async def test_captions_show_what_was_written_and_the_voice_says_its_words():
 def test_the_voice_itself_reads_numbers():
     symbols = "".join(event.symbol for event in synthesize("3.5", "en-us").events)
     assert symbols == "θɹˈiːpɔɪntfˈaɪv"
+
+
+@pytest.mark.parametrize("blank", [" ", "_", "- "])
+async def test_an_answer_of_blanks_holds_nobody_up(blank):
+    clauses, answer = Clauses(), (blank * 4000)[:4000]
+    begun = time.process_time()
+    async for _ in clauses.aggregate(answer):
+        pass
+    assert time.process_time() - begun < 5  # it took minutes, in the loop of all visitors

@@ -28,6 +28,12 @@ HAND_SHOWN = 0.30
 HAND_OFF = 0.08
 """Largest distance in metres between the wrists of a hand and of its arm; else the hand is another.
 """
+GUESSED = 1e-4
+"""Factor of the weights of points beyond the picture's border, where the body model only guesses.
+
+A camera still takes part with its other points, and these do not count as seen by it
+(`agreement.LEAST_WEIGHT`). A single camera's guesses keep their weights: nothing else is known.
+"""
 COARSE_HAND = 0.25
 """Factor of the weights of hand points that the body model finds."""
 NUMBER = {name: number for number, name in enumerate(LANDMARKS)}
@@ -167,9 +173,10 @@ class Watcher:
         if body is None:
             return 0
         camera, pixels = self.seen.cameras[place], part.whole(body.pixels)
-        # The model guesses where limbs would be that the picture cuts off.
-        shown = ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(1)  # (33,)
-        sure = body.visibility * np.where(COARSE, COARSE_HAND, 1) * shown
+        sure = body.visibility * np.where(COARSE, COARSE_HAND, 1)  # (33,)
+        if len(self.seen.cameras) > 1:
+            shown = ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(1)  # (33,)
+            sure = sure * np.where(shown, 1, GUESSED)
         self.seen.pixels[frame, place, POSE] = pixels
         self.seen.weights[frame, place, POSE] = sure
         self.seen.relative[frame, place] = body.relative @ camera.world_to_camera[:3, :3]

@@ -12,6 +12,7 @@ from ico3d.motion.composing.lexicon import requested
 
 CONFIDENT = 0.42  # score from which a note is taken as the answer
 WORDS, LETTERS = 0.7, 0.3  # weights of whole words and of letter triples
+MOST_LETTERS = 1000  # of what a visitor says that are compared with notes
 EXAMPLES = 3  # questions that the avatar proposes when it has no answer
 ENDINGS = ("ingly", "edly", "ing", "ed", "es", "ly", "s")
 CONTRACTIONS = (
@@ -76,6 +77,7 @@ class Notes:
 
     def known(self, question: str) -> str | None:
         """The answer to a question if the notes, the body or politeness have one."""
+        question = question[:MOST_LETTERS]
         if any(concerns(question, topic) for topic in self._persona.forbidden):
             return self.refusal()
         best, score = self.best(question)
@@ -92,8 +94,11 @@ class Notes:
 
     def nearest(self, question: str, count: int) -> list[tuple[Note, float]]:
         """The notes that match best, the best first, and their scores, 0 to 1."""
+        question = unicodedata.normalize("NFKC", question[:MOST_LETTERS])  # may be longer
+        question = question[:MOST_LETTERS]
+        said = self._weighted(words(question)), triples(question)
         scored = [
-            (note, max(self._likeness(question, asked) for asked in note.questions))
+            (note, max(self._likeness(*said, asked) for asked in note.questions))
             for note in self.notes
         ]
         return sorted(scored, key=lambda pair: -pair[1])[:count]
@@ -124,9 +129,9 @@ class Notes:
             return f"Hello! I am {self._persona.name}. What would you like to know?"
         return None
 
-    def _likeness(self, said: str, asked: str) -> float:
-        by_words = cosine(self._weighted(words(said)), self._weighted(words(asked)))
-        by_letters = cosine(triples(said), triples(asked))
+    def _likeness(self, said: dict[str, float], letters: dict[str, float], asked: str) -> float:
+        by_words = cosine(said, self._weighted(words(asked)))
+        by_letters = cosine(letters, triples(asked))
         return WORDS * by_words + LETTERS * by_letters
 
     def _weighted(self, found: list[str]) -> dict[str, float]:

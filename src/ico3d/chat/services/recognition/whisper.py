@@ -1,6 +1,7 @@
 """Speech recognition with Whisper on this machine, through faster-whisper."""
 
 import functools
+import os
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ ON_CUDA = ("large-v3", "large-v3-turbo", "small", "base", "tiny")
 ON_CPU = ("base", "tiny")  # what is larger takes seconds longer than a visitor waits
 DISTILLED, SMALL_ENGLISH = "distil-large-v3", "tiny.en"
 ENGLISH = (DISTILLED, SMALL_ENGLISH)  # know no other language
+MOST_THREADS = 4  # of a CPU; more gain nothing for a few seconds of sound
 NEEDED = ("model.bin", "tokenizer.json")  # what is missing would be downloaded in mid-talk
 _loading = threading.Lock()
 
@@ -178,8 +180,11 @@ def load(folder: Path, device: str, precision: str) -> Any:
     from ico3d.chat.services.recognition.short_whisper import ShortWhisper
 
     kind = ShortWhisper if device == "cpu" else WhisperModel  # GPUs do not notice the difference
+    # A core is left to voice and turns: threads that wait for each other take longer than fewer.
+    threads = max(1, min(MOST_THREADS, (os.cpu_count() or 1) - 1))
+    options = {"compute_type": precision, "cpu_threads": threads, "local_files_only": True}
     try:
-        return kind(str(folder), device, compute_type=precision, local_files_only=True)
+        return kind(str(folder), device, **options)
     except (RuntimeError, ValueError) as error:
         raise SettingsError(
             f"Whisper in {folder} cannot be used on {device} with {precision}: {error}."

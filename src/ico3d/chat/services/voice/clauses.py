@@ -32,7 +32,7 @@ _CLAUSE = re.compile(
 )
 _WIDE = re.compile(r"[\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff\uf900-\ufaff]")
 _UNMARKED = re.compile(r"(?<=[\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff])\s+")  # Thai to Khmer
-_LISTED = re.compile(r"\s*[\W_]*\d{1,3}[.)]\s*\S?")  # the number of a list's entry, and no more
+_LISTED = re.compile(r"[\W_]*+\d{1,3}[.)]\s*\S?")  # the number of a list's entry, and no more
 _EMOJI = re.compile(rf"{EMOJI}|[\u200d\ufe0f]")
 _TRAILING = re.compile(rf"\s*{EMOJI}(\s|{_EMOJI.pattern})*")
 
