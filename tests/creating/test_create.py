@@ -3,12 +3,14 @@
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
 from ico3d.avatar.baking import head_bundle
 from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.packaged import FILE
+from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice
 from ico3d.cli import main
 from ico3d.creating import create as room
 from ico3d.creating import plan
@@ -17,6 +19,7 @@ from ico3d.creating.events import STEPS, Advanced, Looked, Made, Planned, Previe
 from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.examine import Examination
 from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
+from ico3d.creating.voice.clone import Cloned
 from ico3d.errors import BundleError, CaptureError, SettingsError, StorageError
 from ico3d.head.settings import Density, HeadSettings, Initial, Network
 from support.bundles.random_bundle import write_random_bundle
@@ -108,6 +111,49 @@ def test_on_the_body_of_another(tracked, settings, monkeypatch, capfd):
     assert put[1:] == [("sturdy", "navy")]
     create(replace(settings, body=None), [].append)
     assert len(put) == 2 and len(tracked) == 1
+
+
+VOICE = Cloned(np.ones(256, np.float32), ClonedVoice(OPENVOICE, "ada.mp4", "my voice, too"))
+
+
+def _cloning(monkeypatch, voice):
+    """What is asked to be cloned; the result is `voice`."""
+    asked = []
+
+    def clone(settings, place, tell):
+        asked.append(settings.voice_consent)
+        return voice
+
+    monkeypatch.setattr(room, "clone", clone)
+    monkeypatch.setattr(room, "awaits_voice", lambda *_: False)
+    return asked
+
+
+def test_the_avatar_gets_the_voice(tracked, settings, monkeypatch, capfd):
+    asked = _cloning(monkeypatch, VOICE)
+    settings = replace(settings, voice_consent="my voice, too")
+    create(settings, [].append)
+    bundle = Bundle.open(settings.out)
+    assert bundle.manifest.provenance.voice == VOICE.about and bundle.voice is not None
+    assert bundle.manifest.provenance.consent == "yes" and (bundle.voice == 1).all()
+    create(settings, [].append)
+    assert asked == ["my voice, too"]  # it is there already
+    monkeypatch.setattr(room, "clone", lambda *_: None)
+    create(replace(settings, voice_consent=""), [].append)  # withdrawn
+    assert Bundle.open(settings.out).voice is None and len(tracked) == 1
+
+
+def test_the_voice_comes_along_onto_the_body_of_another(tracked, settings, monkeypatch, capfd):
+    _cloning(monkeypatch, VOICE)
+    put = []
+
+    def run(embody):
+        put.append(Bundle.open(embody.head).manifest.provenance.voice)
+        embody.out.write_bytes(embody.head.read_bytes())
+
+    monkeypatch.setattr(room.Embody, "run", run)
+    create(replace(settings, body=FILE, voice_consent="my voice, too"), [].append)
+    assert put == [VOICE.about]
 
 
 def test_a_body_that_cannot_be_used_is_told_before_the_work(tracked, settings, tmp_path):

@@ -6,6 +6,7 @@ machine is not run: its words are parsed and its settings are read.
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import threading
@@ -162,7 +163,7 @@ def test_own_voice(visited):
     assert module.startswith("voice with espeak-ng is at ")
     for line in guide.other_commands("own-voice.md"):
         if line.startswith("ico3d"):
-            assert guide.parsed(line.partition("#")[0].split())
+            assert guide.parsed(shlex.split(line, comments=True))
 
 
 def test_a_voice_is_cloned_with_the_guides_consent_only():

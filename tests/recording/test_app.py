@@ -11,6 +11,7 @@ from ico3d.errors import MissingModelError
 from ico3d.recording import app as server
 from ico3d.recording.guiding import seeing
 from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.plan import scripts
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE, Progress, write_progress
 from support.needs import needs
@@ -76,6 +77,35 @@ def test_nothing_is_recorded_before_somebody_agreed(room, video):
     assert (refused.status_code, refused.json()["code"]) == (403, "consent")
     assert _send(client, "left", video).json()["code"] == "unknown"
     assert list(room.people.folder.iterdir()) == []
+
+
+def test_nobody_is_asked_for_their_voice_unless_it_is_wanted(room):
+    client = _client(room)
+    shown = client.get("/recordings/").json()
+    assert (shown["voice"], shown["mute"]) == ({}, False)
+    client.post("/recordings/Ida", json={"agreed": True, "language": "en", "voice": True})
+    assert "voice_consent" not in room.people.person("Ida").consent()
+
+
+def test_a_voice_is_agreed_to_by_a_tick_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(seeing, "model_file", _lacking)
+    room = server.open_room(tmp_path / "recordings", "127.0.0.1", False, voices=True)
+    client = _client(room)
+    for lacking in ("openvoice is missing.", ""):
+        monkeypatch.setattr(server, "hindrance", lambda lacking=lacking: lacking)
+        shown = client.get("/recordings/").json()
+        assert shown["mute"] == bool(lacking)
+    assert shown["voice"].keys() == shown["consent"].keys() == scripts().keys()
+    form = {"agreed": True, "language": "zh"}
+    for name, ticks in (("Ida", {"voice": True}), ("Ada", {"voice": "yes"}), ("Eve", {})):
+        status = client.post(f"/recordings/{name}", json=form | ticks).json()
+        told, agreed = status["parts"][0]["text"], room.people.person(name).consent()
+        face = shown["consent"]["zh"].format(name=name)
+        assert told == face + (shown["voice"]["zh"] if name == "Ida" else "")
+        assert ("voice_consent" in agreed) == (name == "Ida")
+    german = client.post("/recordings/Bob", json={"agreed": True, "language": "de", "voice": True})
+    said = german.json()["parts"][0]["text"]
+    assert said.endswith(f"entsteht. {shown['voice']['de']}")
 
 
 def test_parts_arrive_in_pieces_and_are_shown_and_removed(page, room, video):

@@ -3,9 +3,13 @@
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from fuzz.reader import Reader
 from fuzz.readers import samples
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import Bundle, give_voice
+from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice
+from ico3d.bundle.people.voice import SIZE
 from ico3d.bundle.persona import read_persona
 from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.capture.sound import read_sound_file
@@ -72,6 +76,13 @@ def _person_on_bones(folder: Path) -> None:
     random_bundle.write_bundle(path, bundle.manifest, files)
 
 
+def _voiced(folder: Path) -> None:
+    """A head with a cloned voice."""
+    path = folder / "a.ico3d"
+    random_bundle.write_random_bundle(path, 20)
+    give_voice(path, ClonedVoice(OPENVOICE, "me.mp4", "agreed"), np.ones(SIZE, np.float32), path)
+
+
 SETTINGS = """
 recognition = "browser"
 allow = ["localhost"]
@@ -123,6 +134,7 @@ FILES = (
             "skinned": lambda f: random_skinned.write_random_skinned(f / "a.ico3d"),
             "whole": lambda f: random_whole.write_random_whole(f / "a.ico3d"),
             "gestures": _person_on_bones,
+            "voice": _voiced,
         },
         lambda: _bundle,
     ),

@@ -56,7 +56,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
     Returns:
         Among others: `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, the
         number of windows, 0 without a body or with one on a skeleton; `body_gaussians` of each
-        window, or of the body on a skeleton; `provenance`.
+        window, or of the body on a skeleton; `voice`, null unless one was cloned; `provenance`.
     """
     from ico3d.bundle.people.provenance import provenance_to_json
     from ico3d.common.typed import plain
@@ -64,6 +64,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
     manifest = bundle.manifest
     head, speech, moving = manifest.head, manifest.speech, manifest.any_body
     windows = manifest.body.windows if manifest.body else ()
+    voice = manifest.provenance.voice
     sizes = {name: entry.size for name, entry in manifest.files.items()}
     return {
         "name": manifest.name,
@@ -79,6 +80,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         "body_seconds": (moving.num_frames - 1) / moving.fps if moving else None,
         "animation": bundle.animation is not None,
         "background": bundle.background,
+        "voice": voice and f"cloned from {voice.recording}; consent: {voice.consent}",
         "loss": plain(manifest.loss),
         "provenance": provenance_to_json(manifest.provenance),
         "files": sizes,

@@ -17,6 +17,8 @@ from ico3d.bundle.head import HEAD, HEAD_REST, POSES, BakedHead, poses_from_byte
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.bundle.packaged import bundle_path
+from ico3d.bundle.people.provenance import ClonedVoice
+from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
@@ -44,6 +46,7 @@ class Bundle:
         cuts: Frames of the recording that are gestures; empty where nobody says which.
         hung: Rotations (R, 4) by role of hanging arms; None without gestures.
         animation: Procedural motion of a whole person; None for a head or a body alone.
+        voice: (256,) float32 tone colour of the voice that was cloned for the avatar, or None.
     """
 
     manifest: Manifest
@@ -54,6 +57,7 @@ class Bundle:
     cuts: tuple[Cut, ...]
     hung: np.ndarray | None
     animation: Animation | None
+    voice: np.ndarray | None
 
     def __init__(self, archive: Archive):
         """Reads and checks every file; use `Bundle.open`.
@@ -155,6 +159,8 @@ class Bundle:
             check_onnx(self.read(SPEECH), SPEECH, self.manifest.speech.input, "expression")
         if LICENSES in self.manifest.files:
             _check_text(self.read(LICENSES))
+        cloned = self.manifest.provenance.voice
+        self.voice = None if cloned is None else voice_from_bytes(self.read(VOICE))
 
 
 def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes]) -> Manifest:
@@ -255,6 +261,25 @@ def add_files(path: Path, more: Mapping[str, bytes]) -> None:
     write_bundle(path, bundle.manifest, files | dict(more))
 
 
+def give_voice(path: Path, voice: ClonedVoice, tone: np.ndarray, out: Path) -> None:
+    """Writes a bundle once more, with a voice that was cloned for the avatar.
+
+    Args:
+        path: The bundle; what it has of another cloned voice is left out.
+        voice: From which recording the voice is, and who agreed to it.
+        tone: (256,) float32 tone colour.
+        out: The bundle to write.
+
+    Raises:
+        BundleError: If the bundle is damaged, nobody agreed, or the tone colour is none.
+    """
+    bundle = Bundle.open(path)
+    files = {name: bundle.read(name) for name in bundle.manifest.files}
+    provenance = replace(bundle.manifest.provenance, voice=voice)
+    manifest = replace(bundle.manifest, provenance=provenance)
+    write_bundle(out, manifest, files | {VOICE: voice_to_bytes(tone)})
+
+
 def _check_listing(manifest: Manifest, archive: Archive) -> None:
     """The files that are there must be just those the manifest lists, with their sizes."""
     _check_required(manifest)
@@ -282,6 +307,8 @@ def _check_required(manifest: Manifest) -> None:
         required |= {SKINNED} | ({SKINNED_REST} if manifest.skinned.num_rest else set())
     if manifest.is_whole:
         required |= {ANIMATION}
+    if manifest.provenance.voice:
+        required |= {VOICE}
     for name in sorted(required - set(manifest.files)):
         raise BundleError(f"{name}: is missing.")
     possible = {LICENSES, *BACKGROUNDS, *([GESTURES] if manifest.skinned else [])}

@@ -5,9 +5,16 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 from ico3d.bundle import limits
-from ico3d.bundle.people.provenance import Provenance, provenance_to_json, with_newer
+from ico3d.bundle.people.provenance import (
+    OPENVOICE,
+    ClonedVoice,
+    Provenance,
+    provenance_to_json,
+    with_newer,
+)
 from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
 from ico3d.bundle.skinned.info import SkinnedInfo, check_skinned
+from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
@@ -265,6 +272,8 @@ def check_manifest(manifest: Manifest) -> None:
     _check_camera(manifest.camera)
     _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
     check_persona(manifest.persona, MANIFEST)
+    if manifest.provenance.voice is not None:
+        _check_voice(manifest.provenance.voice)
     for name, entry in manifest.files.items():
         _check_file(name, entry)
 
@@ -342,6 +351,13 @@ def _check_camera(camera: CameraInfo) -> None:
     _require(1 <= camera.fov_y <= 170, "camera.fov_y", "lie between 1 and 170 degrees")
     _require(camera.eye != camera.target, "camera.eye", "differ from the target")
     _require(any(camera.up), "camera.up", "have a length")
+
+
+def _check_voice(voice: ClonedVoice) -> None:
+    """Nobody's voice is imitated without a word from them."""
+    where = "provenance.voice"
+    _require(voice.engine == OPENVOICE, f"{where}.engine", f"be {OPENVOICE}")
+    _require(is_stated(voice.consent), f"{where}.consent", "say that the voice's owner agreed")
 
 
 def _check_file(name: str, entry: FileEntry) -> None:

@@ -153,8 +153,12 @@ def open_video(path: Path, size: int) -> Video:
     return Video(path, *((height, width) if turned else (width, height)), scale, announced, rate)
 
 
-def read_sound(path: Path) -> Sound | None:
-    """The sound of a video file, mono at 16 kHz; sample 0 belongs to the first picture.
+def read_sound(path: Path, rate: int = SOUND_RATE) -> Sound | None:
+    """The sound of a video file, mono; sample 0 belongs to the first picture.
+
+    Args:
+        path: The file.
+        rate: Samples per second of what is returned.
 
     Returns:
         The sound, or None if the file has none.
@@ -176,11 +180,11 @@ def read_sound(path: Path) -> Sound | None:
             for frame in _sound_frames(path, container, stream)
             for out in mono.resample(frame)
         ]
-        rate = stream.rate
+        recorded = stream.rate
     if not parts:
         return None
-    samples = soxr.resample(np.concatenate(parts), rate, SOUND_RATE, quality="VHQ")
-    return Sound(_shifted(samples, round(offset * SOUND_RATE)), SOUND_RATE)
+    samples = soxr.resample(np.concatenate(parts), recorded, rate, quality="VHQ")
+    return Sound(_shifted(samples, round(offset * rate)), rate)
 
 
 def _sound_frames(path: Path, container, stream) -> Iterator:

@@ -85,6 +85,7 @@ class Serve:
         from ico3d.chat.observing.monitor import Monitor, TurnLog
         from ico3d.chat.parts import make_parts, warm_up
         from ico3d.chat.services.offers import offers
+        from ico3d.chat.services.own_voice import unheard
         from ico3d.chat.serving import server
         from ico3d.chat.serving.network.reach import find_reach, fragment
         from ico3d.chat.serving.sessions import Sessions
@@ -119,8 +120,10 @@ class Serve:
         if figures:
             print(f"Prometheus finds figures at {figures}")
         if avatar and parts:
-            offered = offers(settings, avatar.persona.voice)
-            print("\n".join(described(parts.services, offered)))
+            voices = avatar.persona.voice, avatar.own_voice
+            print("\n".join(described(parts.services, offers(settings, *voices))))
+            if lost := unheard(settings.voice, *voices):
+                print(f"  the avatar has a voice of its own, which is not heard: {lost}")
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()

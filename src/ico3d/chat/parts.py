@@ -18,6 +18,7 @@ from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
 from ico3d.chat.observing.failures import cause
 from ico3d.chat.services import Chosen, ChosenService
+from ico3d.chat.services.own_voice import Own
 from ico3d.chat.services.provider import Context, WarmsUp
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.tools import check_ready
@@ -49,6 +50,7 @@ class Avatar:
         animation: Procedural motion of the body; None for a head alone.
         speech_sha256: SHA-256 of the file of `speech`, by which a remote module is matched.
         clips: Gestures of a body on a skeleton, by name; None without such a body or gestures.
+        own_voice: The voice that was cloned for the avatar; None where none was.
         workers: Threads that compute faces.
     """
 
@@ -60,6 +62,7 @@ class Avatar:
     animation: Animation | None
     speech_sha256: str = ""
     clips: dict[str, Clip] | None = None
+    own_voice: Own | None = None
     workers: Workers = field(default_factory=Workers)
 
 

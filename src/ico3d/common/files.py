@@ -8,7 +8,7 @@ import secrets
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ico3d.errors import StorageError
 
@@ -89,10 +89,10 @@ def read_object(file: Path) -> dict[str, Any]:
     try:
         if not file.is_file() or file.stat().st_size > MOST_NOTES:
             return {}
-        content = json.loads(file.read_text("utf-8"))
+        content: object = json.loads(file.read_text("utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
-    return content if isinstance(content, dict) else {}
+    return cast(dict[str, Any], content) if isinstance(content, dict) else {}
 
 
 def _sync_folder(folder: Path) -> None:

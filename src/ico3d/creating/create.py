@@ -11,7 +11,7 @@ from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.avatar.embodying.command import Embody
 from ico3d.avatar.embodying.embody import body_in
 from ico3d.avatar.embodying.look import check_look
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import Bundle, give_voice
 from ico3d.bundle.persona import Persona, read_persona
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
@@ -27,6 +27,7 @@ from ico3d.creating.measuring import measured
 from ico3d.creating.pace import set_pace
 from ico3d.creating.plan import check_room, expected
 from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
+from ico3d.creating.voice.clone import Cloned, awaits_voice, clone
 from ico3d.creating.workplace import Workplace, workplace
 from ico3d.errors import CaptureError
 from ico3d.head.model_folder import TrainedHead
@@ -68,17 +69,18 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
     if settings.body is not None:
         body_in(Bundle.open(settings.body), settings.look)  # said before the work, not after it
     with workplace(settings) as place, full_disk(place.folder):
-        if place.is_done(settings):
+        if place.is_done(settings) and not awaits_voice(settings, place):
             return _made(settings, place, begin, tell)
         quality = QUALITIES[settings.quality]
         found = _looked(settings, tell)
+        voice = clone(settings, place, tell)
         check_room(place.folder, quality, found)
         tell(_planned(settings, place, found))
         capture = _tracked(settings, place, quality, tell)
         set_pace(settings.device)  # other programs may have come or gone
         head = learn(capture, place.head(settings.quality), settings, quality, tell)
         _measure(head, capture, place, settings, tell)
-        _bake(settings, place, capture.path, persona, said, tell)
+        _bake(settings, place, capture.path, (persona, said, voice), tell)
         place.note_done(settings)
         return _made(settings, place, begin, tell)
 
@@ -151,19 +153,20 @@ def _bake(
     settings: CreateSettings,
     place: Workplace,
     capture: Path,
-    persona: Persona,
-    said: Statement,
+    told: tuple[Persona, Statement, Cloned | None],
     tell: Tell,
 ) -> None:
-    """Writes the avatar.
+    """Writes the avatar, of which is `told` who it is, who agreed, and with which voice it speaks.
 
     It is written even where baking costs more than `ico3d bake` allows, since that is told and
     there is nothing else to have of a short video.
     """
     tell(Advanced("bake", 0.0, "making the avatar's file"))
+    persona, said, voice = told
     about = place.file("persona.json")
     write_atomic(about, json.dumps(plain(persona), indent=1).encode())
-    baked = settings.out if settings.body is None else place.file(HEAD_ALONE)
+    alone = settings.body is None and voice is None
+    baked = settings.out if alone else place.file(HEAD_ALONE)
     Bake(
         place.head(settings.quality),
         (capture, baked),
@@ -173,6 +176,8 @@ def _bake(
         device=settings.device,
         statement=said,
     ).run()
+    if voice is not None:
+        give_voice(baked, voice.about, voice.tone, settings.out if settings.body is None else baked)
     if settings.body is not None:
         tell(Advanced("bake", 0.7, "putting the head on a body"))
         Embody(baked, settings.out, settings.body, settings.build, settings.outfit).run()

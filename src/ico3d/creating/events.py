@@ -23,6 +23,19 @@ class Looked:
 
 
 @dataclass(frozen=True)
+class Voiced:
+    """The person agreed to have their voice cloned, and it was, or could not be.
+
+    Attributes:
+        seconds: Seconds of speech from which it was cloned; 0 where it was not.
+        why: Why it was not, a sentence; empty where it was.
+    """
+
+    seconds: float
+    why: str = ""
+
+
+@dataclass(frozen=True)
 class Planned:
     """How long what is left will take.
 
@@ -95,6 +108,6 @@ class Made:
     seconds: float
 
 
-Event = Looked | Planned | Advanced | Preview | Measured | Made
+Event = Looked | Voiced | Planned | Advanced | Preview | Measured | Made
 Tell = Callable[[Event], None]
 """Is told what happens; called on the thread that works."""

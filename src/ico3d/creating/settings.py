@@ -32,6 +32,9 @@ class CreateSettings:
         licence: Licence under which the avatar may be used; goes into the avatar's manifest.
         made_by: Who makes the avatar; by default the person NAME.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
+        voice_consent: What the person agreed to about their voice, and how. Then the avatar speaks
+            with a voice cloned from the video, where OpenVoice is installed; goes into the avatar's
+            manifest. Without it no voice is cloned.
         body: A whole person on a skeleton, whose body stands in for that of which the video shows
             nothing; `demo` is the avatar of the package. By default the avatar is a head alone.
         build: Build of that body; `medium` is the one that was recorded.
@@ -46,6 +49,7 @@ class CreateSettings:
     licence: str = OWN_USE
     made_by: str = ""
     device: DeviceName = "auto"
+    voice_consent: str = ""
     body: Path | None = None
     build: BuildName = MEDIUM
     outfit: OutfitName = AS_RECORDED

@@ -3,7 +3,7 @@
 from PIL import Image
 from rich.console import Console
 
-from ico3d.creating.events import Event, Looked, Made, Planned, Preview, Step
+from ico3d.creating.events import Event, Looked, Made, Planned, Preview, Step, Voiced
 from ico3d.creating.settings import CreateSettings
 
 NAMES: dict[Step, str] = {
@@ -27,6 +27,8 @@ class Terminal:
         lines: list[str] = []
         if isinstance(event, Looked):
             lines = _of_video(event)
+        elif isinstance(event, Voiced):
+            lines = [_of_voice(event)]
         elif isinstance(event, Planned):
             lines = self._of_plan(event)
         elif isinstance(event, Preview):
@@ -63,6 +65,12 @@ def _of_video(looked: Looked) -> list[str]:
     if not found.hands_sought:
         lines.append("  (hands were not looked for: ico3d weights fetch hand-landmarker)")
     return lines
+
+
+def _of_voice(voiced: Voiced) -> str:
+    if voiced.why:
+        return f"The avatar is made without a voice of its own: {voiced.why}"
+    return f"The avatar's voice is cloned from {voiced.seconds:.0f} s of clean speech."
 
 
 def _of_avatar(made: Made) -> list[str]:

@@ -11,13 +11,17 @@ from pathlib import Path
 
 from ico3d.avatar.embodying.look import UNCHANGED
 from ico3d.bundle.packaged import bundle_path
+from ico3d.bundle.people.voice import VOICE as TONE
 from ico3d.common.files import write_atomic
+from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import plain
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import SettingsError, StorageError
 from ico3d.training.notes.state import begun, ended, note
 
 ABOUT, DONE = "about.json", "done.json"
+VOICE, VOICE_ABOUT = "voice", "cloned_voice.json"
+"""Folder of the cloned voice, and what is known of it, by which `ico3d forget` finds it."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,31 @@ class Workplace:
     def note_done(self, settings: CreateSettings) -> None:
         """Remembers that the avatar was written."""
         self.write(DONE, _wanted(settings, settings.out))
+
+    def voice(self, settings: CreateSettings) -> dict | None:
+        """What is known of the voice that was cloned by the same consent; None where none was."""
+        known = self.read(f"{VOICE}/{VOICE_ABOUT}") or {}
+        whole = known.get("fault") or self.voice_file(TONE).is_file()
+        return known if whole and known.get("consent") == settings.voice_consent else None
+
+    def voice_file(self, name: str) -> Path:
+        """A file about the cloned voice."""
+        return self.file(VOICE) / name
+
+    def note_voice(self, settings: CreateSettings, seconds: float, fault: str) -> dict:
+        """Notes from how many seconds of speech a voice was cloned, or why it cannot be."""
+        known = {
+            "likeness": settings.out.stem,
+            "consent": settings.voice_consent,
+            "seconds": seconds,
+            "fault": fault,
+        }
+        self.write(f"{VOICE}/{VOICE_ABOUT}", known)
+        return known
+
+    def drop_voice(self) -> None:
+        """Removes a cloned voice to which nobody agrees any more."""
+        shutil.rmtree(self.file(VOICE), ignore_errors=True)
 
     def read(self, name: str) -> dict | None:
         """A note that `write` left, or None."""
@@ -121,12 +150,13 @@ def _check_same(place: Workplace, settings: CreateSettings) -> None:
 
 def _wanted(settings: CreateSettings, bundle: Path) -> dict:
     """What tells one avatar of a video from another."""
-    persona, body = settings.persona, settings.body
+    persona, body, voice = settings.persona, settings.body, settings.voice_consent
     return {
         "quality": settings.quality,
         "persona": None if persona is None else _digest(persona),
         "bundle": _digest(bundle),
         **({} if body is None else {"body": _digest(bundle_path(body))}),
+        **({"voice": voice} if is_stated(voice) else {}),
         **({} if settings.look == UNCHANGED else {"look": plain(settings.look)}),
     }
 

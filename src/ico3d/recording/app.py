@@ -20,11 +20,12 @@ from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.common.files import FULL
 from ico3d.common.typed import plain
 from ico3d.creating.settings import QUALITIES
+from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError
 from ico3d.recording.guiding.coverage import covered
 from ico3d.recording.guiding.seeing import Eye, turn_of
 from ico3d.recording.keeping.people import People
-from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import CONSENT, part_ids, scripts
 from ico3d.recording.making.makers import Makers
 from ico3d.recording.making.places import Places
@@ -36,6 +37,8 @@ ROOT = "/recordings/"
 LARGEST_CHUNK, LARGEST_PICTURE, LARGEST_FORM = 8 << 20, 1 << 20, 4096
 """Bytes of a request: a chunk of a part, a picture for guidance, a form."""
 TYPES = {".webm": "video/webm", ".mp4": "video/mp4", ".avi": "video/x-msvideo"}
+UNSPACED = {"zh", "ja"}
+"""Languages without a space between sentences."""
 NEVER_KEPT = {"Cache-Control": "no-store"}
 
 
@@ -48,6 +51,7 @@ class Room:
         eye: The face tracker.
         makers: Processes that make avatars.
         talks: Servers of finished avatars.
+        voices: Whether people are asked if their voice may be cloned, too.
         locks: One for each person, so that nothing is written while something is deleted.
     """
 
@@ -55,6 +59,7 @@ class Room:
     eye: Eye
     makers: Makers
     talks: Talks
+    voices: bool
     locks: defaultdict[str, asyncio.Lock]
 
     def lock(self, name: str) -> asyncio.Lock:
@@ -122,6 +127,10 @@ def _add_people(app: FastAPI, room: Room) -> None:
             "consent": {language: one.consent for language, one in scripts().items()},
             "qualities": list(QUALITIES),
             "lacking": room.eye.lacking,
+            "voice": {language: one.voice for language, one in scripts().items()}
+            if room.voices
+            else {},
+            "mute": bool(room.voices and await asyncio.to_thread(hindrance)),
         }
         return JSONResponse(shown, headers=NEVER_KEPT)
 
@@ -129,7 +138,8 @@ def _add_people(app: FastAPI, room: Room) -> None:
     async def begin(name: str, request: Request) -> Response:
         form = await _form(request)
         agreed = form.get("agreed") is True
-        about = (name, str(form.get("language")), agreed, date.today())
+        voice = room.voices and form.get("voice") is True
+        about = (name, str(form.get("language")), agreed, date.today(), voice)
         person = await asyncio.to_thread(room.people.begin, *about)
         return JSONResponse(await asyncio.to_thread(_status, room, person), 201)
 
@@ -240,7 +250,9 @@ def _status(room: Room, person: Person) -> dict[str, Any]:
     language = about["language"]
     script, found = scripts()[language], {part.id: part for part in person.parts()}
     texts = {f"text-{n}": one.text for n, one in enumerate(script.texts, 1)}
-    texts["consent"] = script.consent.format(name=person.name)
+    texts[CONSENT] = script.consent.format(name=person.name)
+    if VOICE_CONSENT in about:
+        texts[CONSENT] += ("" if language in UNSPACED else " ") + script.voice
     parts = [
         {"id": id, "text": texts.get(id, script.aloud)} | _of_part(found.get(id))
         for id in (*part_ids(language), "upload")
@@ -292,7 +304,12 @@ async def _form(request: Request) -> dict[str, Any]:
 
 
 def open_room(
-    folder: Path, host: str, tls: bool, body: Path | None = None, look: Look = UNCHANGED
+    folder: Path,
+    host: str,
+    tls: bool,
+    body: Path | None = None,
+    look: Look = UNCHANGED,
+    voices: bool = False,
 ) -> Room:
     """What a server of the studio page shares.
 
@@ -302,8 +319,8 @@ def open_room(
         tls: Whether it serves by HTTPS.
         body: A whole person whose body the avatars get; None makes heads alone.
         look: Build and outfit of that body.
+        voices: Whether people are asked if their voice may be cloned, too.
     """
     people = People(folder)
-    return Room(
-        people, Eye(), Makers(people, body, look), Talks(host, tls), defaultdict(asyncio.Lock)
-    )
+    servers = Makers(people, body, look), Talks(host, tls)
+    return Room(people, Eye(), *servers, voices, defaultdict(asyncio.Lock))

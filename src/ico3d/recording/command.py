@@ -29,6 +29,8 @@ class Studio:
             themselves; `demo` is the avatar of the package. By default avatars are heads alone.
         build: Build of that body; `medium` is the one that was recorded.
         outfit: Colours of its clothes; `recorded` are those that were.
+        voice: Ask people, too, whether the avatar may speak with their voice: a tick of its own,
+            off unless they set it. Their voice is then cloned where OpenVoice is installed.
     """
 
     folder: Annotated[Path, tyro.conf.Positional] = Path("recordings")
@@ -39,6 +41,7 @@ class Studio:
     body: Path | None = None
     build: BuildName = MEDIUM
     outfit: OutfitName = AS_RECORDED
+    voice: bool = False
 
     def run(self) -> None:
         """Serves until interrupted.
@@ -56,6 +59,7 @@ class Studio:
         from ico3d.chat.serving.network.reach import find_reach, fragment
         from ico3d.chat.serving.sites import open_sites, shown_key
         from ico3d.chat.settings.embedding import Embedding
+        from ico3d.creating.voice.clone import hindrance
         from ico3d.errors import SettingsError
         from ico3d.recording.app import make_app, open_room
 
@@ -74,7 +78,8 @@ class Studio:
         sites = open_sites(Embedding(), key or "")
         listener = server.bind(self.host, self.port)
         try:
-            room = open_room(self.folder.absolute(), self.host, self.tls, self.body, look)
+            where = (self.folder.absolute(), self.host, self.tls)
+            room = open_room(*where, self.body, look, self.voice)
         except OSError as error:
             raise SettingsError(f"{self.folder} cannot be written ({error.strerror}).") from error
         app = make_app(room, self.host, sites, reach.answered)
@@ -85,6 +90,8 @@ class Studio:
         print(f"Recordings and avatars are in {self.folder}")
         if room.eye.lacking:
             print(f"Without guidance by the face: {room.eye.lacking}", file=sys.stderr)
+        if self.voice and (lacking := hindrance()):
+            print(f"Avatars are made without a voice of their own: {lacking}", file=sys.stderr)
         if not (server.STATIC / "studio.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()

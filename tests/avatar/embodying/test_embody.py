@@ -13,7 +13,8 @@ from ico3d.avatar.poseable import poseable_of
 from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, Bundle, write_bundle
 from ico3d.bundle.head import HEAD, POSES, poses_to_bytes
 from ico3d.bundle.packaged import FILE
-from ico3d.bundle.people.provenance import Part, Provenance
+from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice, Part, Provenance
+from ico3d.bundle.people.voice import SIZE, VOICE, voice_to_bytes
 from ico3d.cli import main
 from ico3d.errors import BundleError
 from support.avatars.filmed_demo import ABROAD
@@ -25,7 +26,10 @@ pytestmark = [pytest.mark.slow, needs("mediapipe")]
 
 DARKER = np.array([-0.8, -0.9, -1.0])
 """By how much the colours of the head alone differ, in logits."""
-ADA = Provenance("portrait", ("ada.mp4",), "agreed", "ours", "Ada", "Bob", "2026-11-24")
+VOICE_OF_ADA = ClonedVoice(OPENVOICE, "ada.mp4", "agreed to the voice, too")
+ADA = Provenance(
+    "portrait", ("ada.mp4",), "agreed", "ours", "Ada", "Bob", "2026-11-24", voice=VOICE_OF_ADA
+)
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +41,7 @@ def alone(tmp_path_factory):
     logits[:, :3] += DARKER
     abroad = replace(moved_head(head, ABROAD), mean_logits=logits.astype(np.float16))
     files = {name: demo.read(name) for name in (THUMBNAIL, SPEECH, LICENSES)}
+    files[VOICE] = voice_to_bytes(np.ones(SIZE, np.float32))
     files |= {HEAD: abroad.to_bytes(), POSES: poses_to_bytes(np.eye(4)[None])}
     info = demo.manifest.head
     assert info is not None
@@ -124,6 +129,11 @@ def test_the_person_speaks_as_the_head_and_moves_as_the_body(whole, demo):
     assert whole.read(LICENSES) == demo.read(LICENSES)  # said once
     person = poseable_of(whole, None)
     assert person is not None and {"wave", "nod"} <= person.clips.keys()
+
+
+def test_the_voice_of_the_head_comes_along(whole):
+    assert whole.manifest.provenance.voice == VOICE_OF_ADA
+    assert whole.voice is not None and (whole.voice == 1).all()
 
 
 def test_it_is_told_which_part_is_recorded(whole):

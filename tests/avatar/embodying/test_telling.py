@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from ico3d.avatar.embodying.telling import told_together
-from ico3d.bundle.people.provenance import Provenance
+from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice, Provenance
 
 ADA = Provenance("portrait", ("ada.mp4",), "Ada agreed", "ours", "Ada", "Bob", "2026-11-24")
 EVE = Provenance("multiview", ("eve",), "Eve agreed", "ours", "Eve")
@@ -32,3 +32,10 @@ def test_who_did_not_agree_is_not_covered_by_another(other):
 def test_nobody_on_nobody_is_nobody():
     told = told_together(NOBODY, replace(NOBODY, sources=("cc0", "mit")))
     assert told.is_synthetic and told.sources == ("cc0", "mit") and told.made_by == "us"
+
+
+def test_a_voice_is_that_of_the_head():
+    voice, other = (ClonedVoice(OPENVOICE, name, "agreed") for name in ("ada.mp4", "eve.mp4"))
+    told = told_together(replace(ADA, voice=voice), replace(EVE, voice=other))
+    assert told.voice == voice
+    assert told_together(ADA, replace(EVE, voice=other)).voice is None

@@ -30,6 +30,17 @@ def test_consent_is_written_as_bundles_state_it(tmp_path):
     assert person.consent()["consent"] == about.consent
 
 
+def test_a_voice_has_a_consent_of_its_own(tmp_path):
+    assert "voice_consent" not in begun(tmp_path).consent()
+    person = People(tmp_path).begin("Ada", "de", True, DAY, voice=True)
+    said = "“Ich bin auch einverstanden, dass der Avatar mit einer Nachahmung meiner Stimme spricht"
+    assert person.consent()["voice_consent"].startswith(f"agreed on 2026-11-24, ticked: {said}")
+    kept(person, "consent", WEBM)
+    spoken = f"agreed on 2026-11-24, ticked and spoken: {said}"
+    assert person.consent()["voice_consent"].startswith(spoken)
+    assert "Stimme" not in person.consent()["consent"]
+
+
 @pytest.mark.parametrize(
     "name", ["", " ", "..", "../x", "a/b", "a\\b", ".x", "-x", "x" * 41, "x.y", "x\0", "1a", "a\nb"]
 )

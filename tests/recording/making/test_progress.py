@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from ico3d.creating.events import Advanced, Looked, Made, Measured, Planned, Preview
+from ico3d.creating.events import Advanced, Looked, Made, Measured, Planned, Preview, Voiced
 from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.examine import Examination
 from ico3d.recording.making.progress import FACE, Progress, Reporter, read_progress
@@ -36,6 +36,18 @@ def test_events_become_steps_time_and_pictures(tmp_path):
     found = read_progress(tmp_path)
     assert found == tell.progress
     assert (found.step, found.faces, found.decibels, found.left) == ("bake", 1, 30.5, 0.0)
+
+
+def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
+    tell = Reporter(tmp_path, Progress("running", "quick"))
+    tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, ADVICE, True)))
+    tell(Voiced(30.0))
+    assert len(tell.progress.advice) == 1
+    tell(Voiced(0.0, "the recording is silent."))
+    found = read_progress(tmp_path)
+    assert found is not None and found.advice[1:] == (
+        "The avatar is made without a voice of its own: the recording is silent.",
+    )
 
 
 def test_what_is_damaged_is_nothing(tmp_path):

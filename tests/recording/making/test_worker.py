@@ -6,11 +6,12 @@ import pytest
 
 from ico3d.creating.events import Advanced, Made, Measured
 from ico3d.errors import CaptureError
+from ico3d.recording.keeping.people import People
 from ico3d.recording.making import worker
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import read_progress
 from support.needs import needs
-from support.studio_page.parts import begun, kept, part_file
+from support.studio_page.parts import DAY, begun, kept, part_file
 
 pytestmark = needs("av")
 
@@ -53,6 +54,20 @@ def test_parts_become_an_avatar_that_says_who_agreed(person, asked, tmp_path):
     assert (settings.licence, settings.made_by) == ("for this person's own use", "Ida")
     found = read_progress(places.folder)
     assert found is not None and (found.state, found.decibels) == ("made", 30.0)
+
+
+def test_a_voice_is_cloned_only_of_those_who_agreed_to_it(person, asked, tmp_path):
+    _recorded(person, tmp_path, "consent", "text-1")
+    worker.make(person, "quick")
+    ada = People(tmp_path / "recordings").begin("Ada", "en", True, DAY, voice=True)
+    _recorded(ada, tmp_path, "consent", "text-1")
+    worker.make(ada, "quick")
+    silent, voiced = asked
+    assert silent.voice_consent == ""
+    assert voiced.voice_consent == (
+        "agreed on 2026-11-24, ticked and spoken: “I also agree that the avatar speaks with an "
+        "imitation of my voice, made from this recording.”"
+    )
 
 
 def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):

@@ -115,6 +115,38 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   expect(readdirSync(folder)).toEqual(['notes.txt']);
 }, 120_000);
 
+test.skipIf(!demo)('a voice is agreed to by a tick of its own, off at first, in the language of the page', async () => {
+  const page = await open();
+  await page.waitForSelector('#start:visible');
+  expect(await page.isVisible('#voice-tick')).toBe(false); // nobody is asked here
+  await browser.close();
+  const own = join(scratchFolder(), 'voices');
+  const asking = await ChatServer.studio(own, 0, '--voice');
+  try {
+    browser = await Browser.launch({ width: 390, height: 844 });
+    const { page } = browser;
+    await page.goto(asking.url);
+    await page.waitForSelector('#voice-tick:visible');
+    expect(await page.isChecked('#voice')).toBe(false);
+    await judge(page, 'studio voice');
+    await page.selectOption('#language', 'de');
+    await expect.poll(() => page.textContent('#voice-sentence')).toMatch(/^Ich bin auch einverstanden, .* meiner Stimme/);
+    for (const [name, ticks] of [['Ida', ['#agreed', '#voice']], ['Ada', ['#agreed']]] as const) {
+      await page.fill('#name', name);
+      for (const tick of ticks) await page.check(tick);
+      await page.click('#begin');
+      await page.waitForSelector('#room:visible');
+      const consent = JSON.parse(readFileSync(join(own, name, 'consent.json'), 'utf8')) as Record<string, string>;
+      expect('voice_consent' in consent).toBe(name === 'Ida');
+      expect((await page.textContent('#text'))!.includes('Stimme')).toBe(name === 'Ida');
+      await page.click('#back');
+      await page.waitForSelector('#start:visible');
+    }
+  } finally {
+    await asking.stop();
+  }
+}, 60_000);
+
 test.skipIf(!demo)('a camera that is not given, and a server that is gone, are told', async () => {
   browser = await Browser.launch({ width: 390, height: 844 });
   const { page } = browser;

@@ -89,6 +89,7 @@ export interface Provenance {
   made_by?: string;
   made_on?: string; // a day such as 2026-11-24
   parts?: Part[];
+  voice?: { recording: string; consent: string }; // cloned for the avatar
 }
 
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
@@ -142,6 +143,10 @@ function checkProvenance(provenance: Provenance): void {
   if (!Array.isArray(sources) || !sources.every((source) => typeof source === 'string')) bad('provenance.sources');
   for (const key of ['likeness', 'made_by', 'made_on'] as const) {
     if (!['string', 'undefined'].includes(typeof provenance[key])) bad(`provenance.${key}`);
+  }
+  const { voice } = provenance;
+  for (const key of ['recording', 'consent'] as const) {
+    if (voice && typeof voice[key] !== 'string') bad(`provenance.voice.${key}`);
   }
 }
 

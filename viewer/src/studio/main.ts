@@ -82,10 +82,14 @@ async function showStart(): Promise<void> {
   show('start');
 }
 
-/** The sentence to agree to, with the name as far as it is typed. */
+/** The sentences to agree to, with the name as far as it is typed. */
 function showSentence(): void {
   const name = byId<HTMLInputElement>(root, 'name').value.trim() || '____';
   byId(root, 'sentence').textContent = overview?.consent[words.language]?.replace('{name}', name) ?? '';
+  const voice = overview?.voice[words.language] ?? '';
+  byId(root, 'voice-tick').hidden = voice === '';
+  byId(root, 'voice-sentence').textContent = voice;
+  byId(root, 'mute').hidden = !overview?.mute;
 }
 
 /** Gets in by the key, if there is one, and begins; asks for it where it is needed. */
@@ -105,8 +109,8 @@ words.onChange(showSentence, signal);
 byId<HTMLFormElement>(root, 'consent').onsubmit = (event) => {
   event.preventDefault();
   problem(null);
-  const agreed = byId<HTMLInputElement>(root, 'agreed').checked;
-  void recordings.begin(byId<HTMLInputElement>(root, 'name').value, words.language, agreed).then(showPerson).catch(failed);
+  const [agreed, voice] = ['agreed', 'voice'].map((id) => byId<HTMLInputElement>(root, id).checked);
+  void recordings.begin(byId<HTMLInputElement>(root, 'name').value, words.language, agreed!, voice!).then(showPerson).catch(failed);
 };
 byId<HTMLFormElement>(root, 'door').onsubmit = (event) => {
   event.preventDefault();

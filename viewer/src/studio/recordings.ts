@@ -45,6 +45,8 @@ export interface Overview {
   consent: Record<string, string>;
   qualities: string[];
   lacking: string; // why there is no face tracker
+  voice: Record<string, string>; // agreed to besides, if the voice may be cloned; empty where nobody is asked
+  mute: boolean; // whether the server lacks what clones voices
 }
 
 /** What is told of a picture of the camera. */
@@ -76,8 +78,8 @@ export class Recordings {
     return this.ask('GET', '');
   }
 
-  begin(name: string, language: string, agreed: boolean): Promise<Status> {
-    return this.ask('POST', at(name), JSON.stringify({ language, agreed }));
+  begin(name: string, language: string, agreed: boolean, voice: boolean): Promise<Status> {
+    return this.ask('POST', at(name), JSON.stringify({ language, agreed, voice }));
   }
 
   status(name: string): Promise<Status> {

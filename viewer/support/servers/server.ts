@@ -19,9 +19,9 @@ export class ChatServer {
     return ChatServer.run(['serve', bundle, '--port', String(port), ...more]);
   }
 
-  /** @param folder where the recordings are */
-  static studio(folder: string, port = 0): Promise<ChatServer> {
-    return ChatServer.run(['studio', folder, '--port', String(port), '--no-browser']);
+  /** @param folder where the recordings are @param more arguments of `ico3d studio` */
+  static studio(folder: string, port = 0, ...more: string[]): Promise<ChatServer> {
+    return ChatServer.run(['studio', folder, '--port', String(port), '--no-browser', ...more]);
   }
 
   private static async run(words: string[]): Promise<ChatServer> {

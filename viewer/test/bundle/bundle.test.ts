@@ -37,8 +37,8 @@ describe('a bundle that Python wrote', () => {
   test('its provenance is text, and what older bundles do not state may lack', () => {
     const written = JSON.parse(read('manifest.json').toString());
     expect(checkManifest(written).provenance).toMatchObject({ consent: 'none needed' });
-    for (const wrong of [null, { ...written.provenance, likeness: 3 }, { ...written.provenance, sources: 'me.mp4' }]) {
-      expect(() => checkManifest({ ...written, provenance: wrong })).toThrow(/manifest\.json: provenance\.\w+ is missing or not/);
+    for (const wrong of [null, { ...written.provenance, likeness: 3 }, { ...written.provenance, sources: 'me.mp4' }, { ...written.provenance, voice: { recording: 'me.mp4' } }]) {
+      expect(() => checkManifest({ ...written, provenance: wrong })).toThrow(/manifest\.json: provenance\.[\w.]+ is missing or not/);
     }
   });
 

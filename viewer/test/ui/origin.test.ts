@@ -56,3 +56,14 @@ test('of a head on the body of another it is told which part is recorded and whi
     ['The body', 'made: it shows nobody'],
   ]);
 });
+
+test('of a cloned voice it is told from which recording it is, and who agreed to it', () => {
+  const voice = { recording: 'me.mp4', consent: 'agreed on 2026-11-26, ticked and spoken' };
+  expect(read({ ...FULL, voice }).slice(0, 5)).toEqual([
+    ['Likeness of', 'Jane Doe'],
+    ['Consent', 'agreed in writing'],
+    ['Voice', 'cloned from the recording me.mp4 with OpenVoice; where that is missing, another voice speaks'],
+    ['Consent to the voice', 'agreed on 2026-11-26, ticked and spoken'],
+    ['Made from', 'me.mp4; hall'],
+  ]);
+});

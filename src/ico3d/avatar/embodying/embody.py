@@ -26,6 +26,7 @@ from ico3d.bundle.animation import ANIMATION
 from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, Bundle, coarse_first, write_bundle
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import Loss, Manifest
+from ico3d.bundle.people.voice import VOICE
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES
 from ico3d.bundle.skinned.info import SKINNED
@@ -202,6 +203,8 @@ def _written(
     )
     if about.speech is not None:
         files[SPEECH] = head.read(SPEECH)
+    if about.provenance.voice is not None:
+        files[VOICE] = head.read(VOICE)
     notices = [b.read(LICENSES).decode() for b in (head, body) if LICENSES in b.manifest.files]
     if notices:
         files[LICENSES] = "\n\n".join(dict.fromkeys(notices)).encode()

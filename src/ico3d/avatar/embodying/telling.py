@@ -32,6 +32,7 @@ def told_together(head: Provenance, body: Provenance, look: Look = UNCHANGED) ->
             Part("head", head.kind, head.likeness),
             look.told(body.kind, body.likeness),
         ),
+        voice=head.voice,
     )
 
 

@@ -9,7 +9,7 @@ ELSEWHERE = (
     "copies of bundles that were served, given away or embedded, and what visitors' browsers kept",
     "films, pictures, reports and exported splats that were made of the person",
     "backups, the history of version control, and copies on other machines",
-    "voices cloned from the person (~/.cache/ico3d/voices)",
+    "voices cloned from recordings that settings name (~/.cache/ico3d/voices)",
 )
 """What no folder can tell of."""
 

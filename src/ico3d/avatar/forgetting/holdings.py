@@ -17,11 +17,14 @@ RUN = "settings.json"
 """File of every training, finished or not, that names what it was made of."""
 MADE_OF = ("capture", "head", "continued")
 """Entries of `RUN` that are paths."""
+VOICE = "cloned_voice.json"
+"""File beside a voice that `ico3d create` has cloned."""
 RECORDINGS = {
     "transforms_train.json": "ico3d.json",
     "cameras.json": "cameras.json",
     "capture.json": "capture.json",
     "consent.json": "consent.json",
+    VOICE: VOICE,
 }
 """Files that mark folders of recordings, and those that say of whom: also of incomplete ones.
 
@@ -105,7 +108,8 @@ def _recording(folder: Path, file: str) -> Holding:
     sources = about.get("sources", ())
     sources = tuple(map(str, sources)) if isinstance(sources, list) else ()
     likeness = NOBODY if file == "capture.json" else str(about.get("likeness", ""))
-    return Holding(folder, "a recording", _named(likeness), (), sources)
+    what = "a cloned voice" if file == VOICE else "a recording"
+    return Holding(folder, what, _named(likeness), (), sources)
 
 
 def _bundle(path: Path) -> Holding:

@@ -10,6 +10,8 @@ from ico3d.errors import BundleError
 
 SYNTHETIC = "synthetic"
 """Kind of a recording that shows nobody: the person was modelled, and filmed inside a computer."""
+OPENVOICE = "openvoice-v2"
+"""The engine of cloned voices."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,21 @@ class Part:
 
 
 @dataclass(frozen=True)
+class ClonedVoice:
+    """A person's voice, imitated: what of it the bundle says beside its file.
+
+    Attributes:
+        engine: What the voice was made for, and can be spoken by: `OPENVOICE`.
+        recording: The recording from which it was cloned.
+        consent: What the voice's owner agreed to, and how.
+    """
+
+    engine: str
+    recording: str
+    consent: str
+
+
+@dataclass(frozen=True)
 class Provenance:
     """Origin of an avatar.
 
@@ -45,6 +62,7 @@ class Provenance:
         made_on: Day on which it was baked, such as 2026-11-24.
         parts: What comes from whom, where the head of one person was put on the body of another;
             empty elsewhere.
+        voice: The voice that was cloned for the avatar; null where it has none of its own.
     """
 
     kind: str
@@ -55,6 +73,7 @@ class Provenance:
     made_by: str = NOT_STATED
     made_on: str = NOT_STATED
     parts: tuple[Part, ...] = ()
+    voice: ClonedVoice | None = None
 
     @property
     def is_synthetic(self) -> bool:
@@ -78,6 +97,7 @@ NEWER: dict[str, Any] = {
     "made_by": NOT_STATED,
     "made_on": NOT_STATED,
     "parts": [],
+    "voice": None,
 }
 
 

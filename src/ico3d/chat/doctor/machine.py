@@ -83,6 +83,7 @@ def of_avatar(bundle: Path, settings: Path | None) -> Iterator[Finding]:
     from ico3d.bundle.format import Bundle
     from ico3d.chat.parts import make_parts
     from ico3d.chat.services.offers import offers
+    from ico3d.chat.services.own_voice import unheard
     from ico3d.chat.serving.server import open_avatar
     from ico3d.chat.settings.conversation import read_settings
 
@@ -100,7 +101,10 @@ def of_avatar(bundle: Path, settings: Path | None) -> Iterator[Finding]:
         yield bad("no conversation can begin", str(error))
         return
     yield good(f"a conversation's services started in {time.monotonic() - began:.1f} s")
-    better = {o.kind: o for o in reversed(offers(read, avatar.persona.voice)) if o.hindrance}
+    voices = avatar.persona.voice, avatar.own_voice
+    if lost := unheard(read.voice, *voices):
+        yield weak("the avatar has a voice of its own, which is not heard", lost)
+    better = {o.kind: o for o in reversed(offers(read, *voices)) if o.hindrance}
     for kind in ("recognition", "language", "voice"):
         service = getattr(services, kind)
         told = f"{kind} is {service.name}"

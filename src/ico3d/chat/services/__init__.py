@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from ico3d.chat.services import language, recognition, voice
 from ico3d.chat.services.choosing import ChosenService, chosen
+from ico3d.chat.services.own_voice import Own, speaking
 from ico3d.chat.services.provider import Table
 from ico3d.chat.services.recognition import browser
 from ico3d.chat.settings.conversation import ChatSettings, Choice
@@ -46,13 +47,16 @@ class Chosen:
         return protocol.Dictation(options.language, title)
 
 
-def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> Chosen:
+def choose(
+    settings: ChatSettings, voices: Mapping[str, str] | None = None, own: Own | None = None
+) -> Chosen:
     """Finds the services that the settings name.
 
     Args:
         settings: Names and options of the services.
         voices: The persona's voice for each provider of voices; a voice in the settings has
             priority.
+        own: The voice that was cloned for the avatar, which is heard where it can be.
 
     Raises:
         SettingsError: If a service is unknown, or its options are wrong.
@@ -60,7 +64,10 @@ def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> C
     return Chosen(
         chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
         chosen(language.PROVIDERS, settings.language, "language"),
-        with_voice(chosen(voice.PROVIDERS, settings.voice, "voice"), settings.voice, voices or {}),
+        speaking(settings.voice, voices or {}, own)
+        or with_voice(
+            chosen(voice.PROVIDERS, settings.voice, "voice"), settings.voice, voices or {}
+        ),
     )
 
 

@@ -4,18 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ico3d.chat.services import TABLES, Chosen, ChosenService, chosen, with_voice
+from ico3d.chat.services.own_voice import Own, speaking
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire import protocol
 
 LONGEST_HINDRANCE = 400  # characters: all offers go into one message
 
 
-def offers(settings: ChatSettings, voices: Mapping[str, str]) -> list[protocol.Offer]:
+def offers(
+    settings: ChatSettings, voices: Mapping[str, str], own: Own | None = None
+) -> list[protocol.Offer]:
     """All services and what hinders them, for the page; asking each of them may take 1 s.
 
     Args:
         settings: Names and options of the services.
         voices: The persona's voice for each provider of voices.
+        own: The voice that was cloned for the avatar.
 
     Raises:
         SettingsError: If options are wrong.
@@ -23,14 +27,20 @@ def offers(settings: ChatSettings, voices: Mapping[str, str]) -> list[protocol.O
     found = []
     for kind, table in TABLES.items():
         for key in table:
-            service = named(settings, voices, kind, key)
+            service = named(settings, voices, kind, key, own)
             hindrance = service.provider.hindrance(service.options)[:LONGEST_HINDRANCE]
             name = service.described().name
             found.append(protocol.Offer(kind, key, name, hindrance))  # type: ignore[arg-type]
     return found
 
 
-def named(settings: ChatSettings, voices: Mapping[str, str], kind: str, key: str) -> ChosenService:
+def named(
+    settings: ChatSettings,
+    voices: Mapping[str, str],
+    kind: str,
+    key: str,
+    own: Own | None = None,
+) -> ChosenService:
     """A service of a table with the options that settings and persona give for it.
 
     Raises:
@@ -39,7 +49,9 @@ def named(settings: ChatSettings, voices: Mapping[str, str], kind: str, key: str
     set_choice: Choice = getattr(settings, kind)
     choice = set_choice if set_choice.use == key else Choice(key)
     service = chosen(TABLES[kind], choice, kind)
-    return with_voice(service, choice, voices) if kind == "voice" else service
+    if kind != "voice":
+        return service
+    return speaking(choice, voices, own) or with_voice(service, choice, voices)
 
 
 def wished(
@@ -48,6 +60,7 @@ def wished(
     voices: Mapping[str, str],
     wishes: Mapping[str, str],
     offered: Sequence[protocol.Offer],
+    own: Own | None = None,
 ) -> Chosen:
     """The services with a visitor's wishes, as far as those are offered and work.
 
@@ -57,10 +70,11 @@ def wished(
         voices: The persona's voice for each provider of voices.
         wishes: Wished services by kind, as keys of offers.
         offered: Services that may be wished for.
+        own: The voice that was cloned for the avatar.
     """
     working = {(offer.kind, offer.key) for offer in offered if not offer.hindrance}
     granted = {
-        kind: named(settings, voices, kind, key)
+        kind: named(settings, voices, kind, key, own)
         for kind, key in wishes.items()
         if (kind, key) in working
     }

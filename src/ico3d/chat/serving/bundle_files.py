@@ -16,6 +16,7 @@ from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST
+from ico3d.bundle.people.voice import VOICE
 from ico3d.bundle.persona import Persona
 from ico3d.chat.serving.page_files import ASK_AGAIN, FOR_EVER, preferred
 from ico3d.errors import BundleError
@@ -61,7 +62,7 @@ class BundleFiles:
 
     def answer(self, name: str, request: Request) -> Response:
         """The file `name`, or 304 if the browser has it."""
-        if name not in self._bundle.names:
+        if name not in self._bundle.names or name == VOICE:  # no page needs it: it stays here
             return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
         entry = self._bundle.manifest.files.get(name)
         try:

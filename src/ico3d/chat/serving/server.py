@@ -18,6 +18,7 @@ from ico3d.chat.parts import Avatar
 from ico3d.chat.performing.face import open_face
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
+from ico3d.chat.services.own_voice import own_of
 from ico3d.chat.serving.bundle_files import BundleFiles
 from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.echo import echo
@@ -51,10 +52,11 @@ def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None 
     """
     head, speech = open_face(bundle)
     persona = persona or bundle.manifest.persona
-    services = choose(settings, persona.voice)
+    own = own_of(bundle, persona)
+    services = choose(settings, persona.voice, own)
     sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
     moves = bundle.animation, sha256, bundle.gestures
-    return Avatar(head, speech, persona, services, settings, *moves)
+    return Avatar(head, speech, persona, services, settings, *moves, own)
 
 
 def make_app(
@@ -81,7 +83,8 @@ def make_app(
         # Strangers may not choose services that cost money, nor learn about the machine.
         sessions.at_home = host in LOOPBACK and not names and not sites.any
         if sessions.at_home:
-            sessions.offers = offers(avatar.settings, avatar.persona.voice)
+            voices = avatar.persona.voice, avatar.own_voice
+            sessions.offers = offers(avatar.settings, *voices)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

@@ -201,8 +201,9 @@ class Sessions:
 
     def _wished(self, hello: Hello) -> Avatar:
         avatar = self._avatar
-        voices = avatar.persona.voice
-        services = wished(avatar.services, avatar.settings, voices, hello.wishes, self.offers)
+        voices, own = avatar.persona.voice, avatar.own_voice
+        wishes = hello.wishes, self.offers
+        services = wished(avatar.services, avatar.settings, voices, *wishes, own)
         return replace(avatar, services=services)
 
     async def _begin(self, hello: Hello, outbox: Outbox, ticket: Ticket) -> Session:

@@ -40,7 +40,7 @@ def sound_advice(sound: Sound | None) -> Iterator[Advice]:
             "switch the microphone on and film again."
         ))  # fmt: skip
         return
-    clipped = [WINDOW * (place + 0.5) for place in np.flatnonzero(_clips(pieces))]
+    clipped = [WINDOW * (place + 0.5) for place in np.flatnonzero(clips(pieces))]
     if clipped:
         text = "the sound is clipped: speak softer, or move away from the microphone."
         yield Advice("sound", "better", text, spans_of(clipped, 1.0))
@@ -53,8 +53,8 @@ def sound_advice(sound: Sound | None) -> Iterator[Advice]:
         ))  # fmt: skip
 
 
-def _clips(pieces: np.ndarray) -> np.ndarray:
-    """(P,) whether a piece has samples at the limit in a row."""
+def clips(pieces: np.ndarray) -> np.ndarray:
+    """(P,) whether a piece of (P, n) has samples at the limit in a row."""
     at_limit = np.abs(pieces) >= CLIPPED  # (P, n)
     rows = at_limit.shape[1] - IN_A_ROW + 1
     in_a_row = np.stack([at_limit[:, i : i + rows] for i in range(IN_A_ROW)])  # (3, P, rows)

@@ -11,7 +11,7 @@ from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
 from ico3d.common.files import write_atomic
 from ico3d.creating.settings import OWN_USE
-from ico3d.recording.keeping.person import CONSENT_FILE, Person
+from ico3d.recording.keeping.person import CONSENT_FILE, TICKED, VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import scripts
 from ico3d.recording.refusals import Refused, bad_name, full_disk
 
@@ -47,7 +47,9 @@ class People:
             raise Refused("unknown", f"nothing is recorded of {name[:40]}.", 404)
         return Person(folder)
 
-    def begin(self, name: str, language: str, agreed: bool, today: date) -> Person:
+    def begin(
+        self, name: str, language: str, agreed: bool, today: date, voice: bool = False
+    ) -> Person:
         """Begins a recording with what the person agreed to.
 
         Args:
@@ -55,6 +57,7 @@ class People:
             language: Language in which they agree and read.
             agreed: Whether they ticked the sentence.
             today: The day.
+            voice: Whether they ticked that their voice may be cloned, too.
 
         Raises:
             Refused: If the name is none or taken, if they did not agree, or there is no room.
@@ -70,11 +73,12 @@ class People:
         if len(self.names()) >= MOST:
             raise Refused("many", "there are recordings of 100 people: delete some of them.", 409)
         self.check_room()
-        said = f"“{script.consent.format(name=name)}”"
-        about = Provenance(
-            "portrait", (), f"agreed on {today.isoformat()}, ticked: {said}", OWN_USE, name, name
-        )
+        how = f"agreed on {today.isoformat()}{TICKED}"
+        said = f"{how}“{script.consent.format(name=name)}”"
+        about = Provenance("portrait", (), said, OWN_USE, name, name)
         stated = provenance_to_json(about) | {"language": language}
+        if voice:
+            stated[VOICE_CONSENT] = f"{how}“{script.voice}”"
         text = json.dumps(stated, indent=1, ensure_ascii=False)
         write_atomic(self.folder / name / CONSENT_FILE, text.encode())
         return Person(self.folder / name)

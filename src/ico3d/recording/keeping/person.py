@@ -18,6 +18,8 @@ MOST_BYTES, MOST_UPLOADED = 256 << 20, 2 << 30
 """Largest size of a recorded part, and of a video that is brought."""
 TICKED, TICKED_AND_SPOKEN = ", ticked: ", ", ticked and spoken: "
 """How a person agreed, as their consent says it."""
+VOICE_CONSENT = "voice_consent"
+"""Entry of the consent of those who agreed that their voice is cloned, too."""
 MOST_TAKES = 4
 """Unfinished takes of one part that are kept; older ones make room."""
 
@@ -165,7 +167,8 @@ class Person:
     def _state(self, before: str, now: str) -> None:
         """Says of the consent how it was given."""
         about = self.consent()
-        about["consent"] = about["consent"].replace(before, now)
+        for entry in {"consent", VOICE_CONSENT} & about.keys():
+            about[entry] = about[entry].replace(before, now)
         text = json.dumps(about, indent=1, ensure_ascii=False)
         write_atomic(self.folder / CONSENT_FILE, text.encode())
 

@@ -33,6 +33,7 @@ class Script:
 
     Attributes:
         consent: What the person agrees to, with `{name}`.
+        voice: What they agree to besides, if their voice may be cloned.
         aloud: What they say while they turn the head.
         sounds: The language's speech sounds, in espeak-ng's symbols.
         texts: Texts that have all of these.
@@ -40,6 +41,7 @@ class Script:
     """
 
     consent: str
+    voice: str
     aloud: str
     sounds: tuple[str, ...]
     texts: tuple[Reading, ...]
@@ -69,4 +71,5 @@ def _read() -> dict[str, dict]:
 def _script(about: dict) -> Script:
     texts = tuple(Reading(one["text"], one.get("spoken", one["text"])) for one in about["texts"])
     heard = tuple(tuple(one["sounds"]) for one in about["texts"])
-    return Script(about["consent"], about["aloud"], tuple(about["sounds"]), texts, heard)
+    said = about["consent"], about["voice"], about["aloud"]
+    return Script(*said, tuple(about["sounds"]), texts, heard)

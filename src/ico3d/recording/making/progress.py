@@ -11,7 +11,17 @@ from PIL import Image
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import plain
-from ico3d.creating.events import STEPS, Advanced, Event, Looked, Made, Planned, Preview, Step
+from ico3d.creating.events import (
+    STEPS,
+    Advanced,
+    Event,
+    Looked,
+    Made,
+    Planned,
+    Preview,
+    Step,
+    Voiced,
+)
 from ico3d.creating.settings import QualityName
 
 FILE, FACE = "progress.json", "face.jpg"
@@ -92,6 +102,9 @@ class Reporter:
         if isinstance(event, Looked):
             better = tuple(str(one) for one in event.found.advice if one.level == "better")
             self.change(advice=better)
+        elif isinstance(event, Voiced) and event.why:
+            without = f"The avatar is made without a voice of its own: {event.why}"
+            self.change(advice=(*self.progress.advice, without))
         elif isinstance(event, Planned):
             self._plan = dict(event.seconds)
             self.change(left=sum(self._plan.values()))

@@ -15,7 +15,7 @@ from ico3d.common.files import write_atomic
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError
-from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
 from ico3d.recording.making.beside import end_with_parent
 from ico3d.recording.making.joining import join
@@ -52,6 +52,7 @@ def make(
             consent=about["consent"],
             licence=about["licence"],
             made_by=about["made_by"],
+            voice_consent=about.get(VOICE_CONSENT, ""),
             body=body,
             build=look.build,
             outfit=look.outfit,

@@ -193,22 +193,23 @@ def test_another_skeleton_is_refused(body):
     )
 
 
-@pytest.mark.parametrize("normals", [0, -128])
-def test_extreme_values_stay_within_the_file(body, normals):
+@pytest.mark.parametrize(("normals", "edge"), [(0, 32767), (-128, -32768)])
+def test_extreme_values_stay_within_the_file(body, normals, edge):
     some = body.chosen(np.arange(0, body.info.num_gaussians, 1999))
     count = some.info.num_gaussians
     hostile = replace(
         some,
         normals=np.full((count, 3), normals, np.int8),
         shapes=np.full_like(some.shapes, -128),
-        log_scales=np.full((count, 3), -60, np.float16),
+        log_scales=np.full((count, 3), -60_000, np.float16),
         means=some.means * 1e3,
-        lamp=None,
-        info=replace(some.info, num_casters=0),
+        lamp=replace(some.lamp, caster_points=np.full_like(some.lamp.caster_points, edge)),
     )
     for build in OTHERS:
-        with np.errstate(all="raise"):
-            assert reshaped(hostile, build).to_bytes()
+        with np.errstate(divide="raise", invalid="raise"):
+            found = reshaped(hostile, build)
+        assert found.to_bytes() and found.lamp is not None
+        assert (np.sign(found.lamp.caster_points) == np.sign(edge)).all()
 
 
 def test_the_data_is_small():

@@ -29,7 +29,13 @@ export function rowsOf(provenance: Provenance): [Key, Sentence][] {
         ['origin.likeness', told(provenance.likeness)],
         ['origin.consent', told(consent)],
       ];
-  return [...who, ...(provenance.parts ?? []).map(ofPart), ['origin.sources', told(sources.join('; '))], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
+  const voice: [Key, Sentence][] = provenance.voice
+    ? [
+        ['origin.voice', say('origin.cloned', { recording: provenance.voice.recording })],
+        ['origin.voice.consent', told(provenance.voice.consent)],
+      ]
+    : [];
+  return [...who, ...(provenance.parts ?? []).map(ofPart), ...voice, ['origin.sources', told(sources.join('; '))], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
 }
 
 /** Whether the head, or the body, was recorded or made. */

@@ -19,6 +19,8 @@ STRETCH = 1.3
 Surfaces stay within it; inside of an arm, where front and back move apart, what lies there would
 be drawn out until it shows outside.
 """
+SMALLEST = 1e-30
+"""Least size of a Gaussian in metres, which has a logarithm."""
 NORMAL_UNIT = 127
 SHAPE_UNIT = 127
 """Largest whole number of normals, and of residual shapes."""
@@ -90,7 +92,7 @@ def _stretched(body: BakedSkinned, slopes: np.ndarray) -> dict[str, np.ndarray]:
     shapes, scales = _turned(body, slopes)
     return {
         "quats": np.rint(from_matrix(axes) * QUAT_UNIT).astype(np.int16),
-        "log_scales": np.log(lengths).astype(np.float16),
+        "log_scales": np.log(lengths.clip(SMALLEST)).astype(np.float16),
         "normals": _whole(facing[..., 0], NORMAL_UNIT),
         "shapes": shapes,
         "shape_scales": scales,
@@ -112,8 +114,9 @@ def _lamp(body: BakedSkinned, change: Change) -> BakedLamp | None:
     if body.lamp is None:
         return None
     points = body.lamp.caster_points * POINT_UNIT
-    moved = np.rint((points + change.at(points)[0]) / POINT_UNIT).astype(np.int16)
-    return replace(body.lamp, caster_points=moved)
+    moved = np.rint((points + change.at(points)[0]) / POINT_UNIT)
+    far = np.iinfo(np.int16)
+    return replace(body.lamp, caster_points=moved.clip(far.min, far.max).astype(np.int16))
 
 
 def _whole(vectors: np.ndarray, unit: int) -> np.ndarray:

@@ -4,7 +4,13 @@ from ico3d.chat.services.provider import Provider, Table
 from ico3d.chat.services.voice import espeak, hibari, kokoro, openai, openvoice, piper
 
 PROVIDERS: Table = {
-    "openvoice": Provider("OpenVoice V2", openvoice.Settings, openvoice.make, openvoice.hindrance),
+    "openvoice": Provider(
+        "OpenVoice V2",
+        openvoice.Settings,
+        openvoice.make,
+        openvoice.hindrance,
+        detail=openvoice.detail,
+    ),
     "kokoro": Provider("Kokoro", kokoro.Settings, kokoro.make, kokoro.hindrance),
     "piper": Provider("Piper", piper.Settings, piper.make, piper.hindrance),
     "espeak-ng": Provider(

@@ -85,6 +85,17 @@ class Settings:
         return LANGUAGES[self.language][0]
 
 
+@dataclass(frozen=True)
+class OwnVoice(Settings):
+    """Options of an avatar that has a voice of its own.
+
+    Attributes:
+        tone: Tone colour of that voice: 256 float32 values.
+    """
+
+    tone: bytes = b""
+
+
 class Engine:
     """The models for some settings, shared by all sessions; speaks one text at a time."""
 
@@ -102,7 +113,7 @@ class Engine:
         with loading():
             self._base = self._load_base()
             self._speaker_id = self._find_speaker()
-            if recording:
+            if recording or isinstance(settings, OwnVoice):
                 self._converter = self._load_converter(recording)
             self.speak(LANGUAGES[settings.language][1])
 
@@ -135,21 +146,22 @@ class Engine:
             raise SettingsError(f"chat settings: voice 'openvoice': voice must be {known}.")
         return speakers[self._settings.voice]
 
-    def _load_converter(self, recording: Recording) -> Any:
-        folder = model_of("openvoice")
+    def _load_converter(self, recording: Recording | None) -> Any:
+        """The converter to the voice of a recording; without one to the avatar's own."""
         import torch
-        from openvoice.api import ToneColorConverter
 
         device = str(self._base.device)
-        converter = ToneColorConverter(str(folder / "converter" / "config.json"), device=device)
-        checkpoint = folder / "converter" / "checkpoint.pth"
-        converter.load_ckpt(str(checkpoint))
+        converter = load_converter(device)
         if not self._settings.watermark:
             converter.watermark_model = None  # its constructor does not take this wish
-        target = recording.embedding(lambda path: converter.extract_se([path]).cpu().numpy())
+        if isinstance(self._settings, OwnVoice):
+            target = np.frombuffer(self._settings.tone, np.float32).reshape(1, -1, 1).copy()
+        else:
+            assert recording is not None
+            target = recording.embedding(lambda path: extract(converter, path))
         self._target = torch.from_numpy(target).to(device)
         name = self._settings.voice.lower().replace("_", "-")
-        source = folder / "base_speakers" / "ses" / f"{name}.pth"
+        source = model_of("openvoice") / "base_speakers" / "ses" / f"{name}.pth"
         self._source = torch.load(source, map_location=device, weights_only=True)
         return converter
 
@@ -162,6 +174,37 @@ class Engine:
             soundfile.write(path, samples, rate)
             converted = self._converter.convert(str(path), self._source, self._target)
         return converted, self._converter.hps.data.sampling_rate
+
+
+def load_converter(device: str) -> Any:
+    """OpenVoice's converter of tone colours.
+
+    Raises:
+        MissingModelError: If its weights are not installed.
+    """
+    folder = model_of("openvoice") / "converter"
+    from openvoice.api import ToneColorConverter
+
+    converter = ToneColorConverter(str(folder / "config.json"), device=device)
+    converter.load_ckpt(str(folder / "checkpoint.pth"))
+    return converter
+
+
+def extract(converter: Any, path: str) -> np.ndarray:
+    """(1, 256, 1) the tone colour of a recording."""
+    return converter.extract_se([path]).cpu().numpy()
+
+
+def tone_colour(path: Path) -> np.ndarray:
+    """(256,) float32 tone colour of a recording; its owner's consent is the caller's to ask for.
+
+    Raises:
+        MissingModelError: If files are not installed.
+        SettingsError: If packages are not installed.
+    """
+    with loading():
+        tone = extract(load_converter("cpu"), str(path))
+    return np.ascontiguousarray(tone.reshape(-1), np.float32)
 
 
 def permitted(settings: Settings) -> Recording | None:
@@ -218,11 +261,26 @@ engine = functools.cache(Engine)
 
 def hindrance(settings: Settings) -> str:
     """A sentence on missing packages or weights; empty if OpenVoice works."""
-    for package in ("melo", "openvoice"):
+    converts = settings.reference or isinstance(settings, OwnVoice)
+    return _lack(("melo", "openvoice"), (settings.weights, *(["openvoice"] if converts else [])))
+
+
+def cloning_hindrance() -> str:
+    """A sentence on what is missing to take a tone colour from a recording; empty if nothing is."""
+    return _lack(("openvoice",), ("openvoice",))
+
+
+def _lack(packages: tuple[str, ...], weights: tuple[str, ...]) -> str:
+    """A sentence on the first that is not installed, else empty."""
+    for package in packages:
         if importlib.util.find_spec(package) is None:
             return f"{package} is not installed: {INSTALL}"
-    needed = (settings.weights, "openvoice") if settings.reference else (settings.weights,)
-    return next((lack for name in needed if (lack := lacks_weights(name))), "")
+    return next((lack for name in weights if (lack := lacks_weights(name))), "")
+
+
+def detail(settings: Settings) -> str:
+    """Says of an avatar's own voice that it is one."""
+    return "own voice" if isinstance(settings, OwnVoice) else ""
 
 
 def make(settings: Settings, context: Context) -> PieceVoice:

@@ -1,0 +1,111 @@
+"""Clones the voice of a recording, where its owner agreed and OpenVoice is installed."""
+
+import importlib.util
+import tempfile
+import wave
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice
+from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
+from ico3d.capture.video import read_sound
+from ico3d.common.files import write_atomic
+from ico3d.common.people.stated import is_stated
+from ico3d.creating.events import Tell, Voiced
+from ico3d.creating.settings import CreateSettings
+from ico3d.creating.workplace import Workplace
+from ico3d.errors import BundleError, MissingModelError, SettingsError
+
+RATE = 22_050
+"""Samples per second that OpenVoice listens to."""
+LATER = " The same command clones the voice once that is mended."
+
+
+@dataclass(frozen=True)
+class Cloned:
+    """A voice that was cloned for an avatar.
+
+    Attributes:
+        tone: (256,) float32 tone colour.
+        about: From which recording it is, and who agreed to it.
+    """
+
+    tone: np.ndarray
+    about: ClonedVoice
+
+
+def clone(settings: CreateSettings, place: Workplace, tell: Tell) -> Cloned | None:
+    """The voice of the video, if its owner agreed; what was cloned once is not cloned again.
+
+    Args:
+        settings: The video, and what its person agreed to.
+        place: Where the voice is kept meanwhile.
+        tell: Told whether there is a voice, or why not. Without consent nothing is told.
+
+    Returns:
+        The voice; None where there is none, and the avatar is made without it.
+
+    Raises:
+        CaptureError: If the video's sound claims more than is accepted.
+        StorageError: If the disk is full.
+    """
+    if not is_stated(settings.voice_consent):
+        place.drop_voice()
+        return None
+    about = ClonedVoice(OPENVOICE, settings.video.name, settings.voice_consent)
+    known = place.voice(settings)
+    if known is None:
+        if lacking := hindrance():
+            return _without(lacking + LATER, tell)
+        try:
+            known = _made(settings, place)
+        except (BundleError, MissingModelError, SettingsError) as error:
+            return _without(f"{error}{LATER}", tell)
+    if known["fault"]:
+        return _without(known["fault"], tell)
+    tell(Voiced(known["seconds"]))
+    return Cloned(voice_from_bytes(place.voice_file(VOICE).read_bytes()), about)
+
+
+def awaits_voice(settings: CreateSettings, place: Workplace) -> bool:
+    """Whether a voice can be cloned now that could not be when the avatar was made."""
+    wanted = is_stated(settings.voice_consent) and place.voice(settings) is None
+    return wanted and not hindrance()
+
+
+def hindrance() -> str:
+    """A sentence on what is missing to clone a voice; empty if nothing is."""
+    if importlib.util.find_spec("pipecat") is None:
+        return "pipecat is not installed: pip install 'ico3d[chat,openvoice]'."
+    from ico3d.chat.services.voice.openvoice import cloning_hindrance
+
+    return cloning_hindrance()
+
+
+def _made(settings: CreateSettings, place: Workplace) -> dict:
+    """Clones the voice and keeps it; what is known of it."""
+    from ico3d.chat.services.voice.openvoice import tone_colour
+    from ico3d.creating.voice.stretches import clean_speech
+
+    place.drop_voice()
+    speech = clean_speech(read_sound(settings.video, RATE))
+    if not speech.fault:
+        write_atomic(place.voice_file(VOICE), voice_to_bytes(heard(speech.samples, tone_colour)))
+    return place.note_voice(settings, speech.seconds, speech.fault)
+
+
+def heard(samples: np.ndarray, tell: Callable[[Path], np.ndarray]) -> np.ndarray:
+    """What `tell` says of a sound at `RATE`, which is a file only meanwhile."""
+    with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
+        path = Path(folder) / "voice.wav"
+        with wave.open(str(path), "wb") as file:
+            file.setparams((1, 2, RATE, 0, "NONE", ""))
+            file.writeframes((samples * 32767).astype("<i2").tobytes())
+        return tell(path)
+
+
+def _without(why: str, tell: Tell) -> None:
+    tell(Voiced(0.0, why))
