@@ -55,6 +55,7 @@ function showPerson(status: Status): void {
   const state = status.making?.state;
   show(...(state ? ['making'] : []), ...(state === 'running' ? [] : ['room']));
   words.write(byId(root, 'title'), status.name);
+  words.write(byId(root, 'delete'), say('studio.delete', { name: status.name }));
   room.show(status);
   making.show(status);
 }
