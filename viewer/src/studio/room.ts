@@ -80,8 +80,9 @@ export class Room {
     this.write();
   }
 
-  /** Leaves the person; the camera goes off. */
+  /** Leaves the person; the camera goes off, and of a part that is being recorded stays what was sent. */
   leave(): void {
+    this.sending = null;
     this.camera.close();
     this.status = null;
   }
@@ -116,7 +117,7 @@ export class Room {
     const { name } = this.status!;
     this.sending = new Sending(this.ports.recordings, name, this.current, (lost) => this.ports.problem(lost ? say('studio.lost') : null));
     [this.began, this.most] = [performance.now(), 0];
-    this.camera.record(this.sending, (error) => void this.breakOff(error));
+    this.camera.record(this.sending, (error) => void this.breakOff(error).catch(this.ports.failed));
     this.write();
   }
 
@@ -146,7 +147,7 @@ export class Room {
   }
 
   private loseCamera(): void {
-    if (this.sending) void this.finish();
+    if (this.sending) void this.finish().catch(this.ports.failed);
     this.ports.problem(say('studio.camera.lost'));
     this.write();
   }
@@ -244,7 +245,7 @@ export class Room {
     if (!this.camera.isRecording) return;
     const seconds = Math.floor((performance.now() - this.began) / 1000);
     this.ports.words.write(byId(this.root, 'clock'), say('studio.recording', { n: seconds }));
-    if (seconds >= LONGEST) void this.finish();
+    if (seconds >= LONGEST) void this.finish().catch(this.ports.failed);
   }
 
   private write(): void {
