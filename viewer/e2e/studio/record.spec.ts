@@ -137,6 +137,31 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   expect(readdirSync(folder)).toEqual(['notes.txt']);
 }, 120_000);
 
+test.skipIf(!demo)('who leaves while it records, and who was deleted in another tab', async () => {
+  const page = await open();
+  await page.fill('#name', 'Eva');
+  await page.check('#agreed');
+  await page.click('#begin');
+  await page.click('#open');
+  await record();
+  await page.click('#back');
+  await page.click('#people button');
+  await reached('consent', 'broken'); // what was sent can be kept
+  expect(await page.isVisible('#open')).toBe(true);
+  expect(await page.isVisible('#salvage')).toBe(true);
+
+  const other = await browser.context.newPage();
+  other.on('dialog', (dialog) => void dialog.accept());
+  await other.goto(server.url);
+  await other.click('#people button');
+  await other.click('#delete');
+  await other.waitForSelector('#start:visible');
+  await other.close();
+  await page.click('#salvage');
+  await page.waitForSelector('#start:visible');
+  await expect.poll(() => page.textContent('#problem'), PATIENCE).toBe('Everything of Eva is gone.');
+}, 120_000);
+
 test.skipIf(!demo)('a camera that is not given, and a server that is gone, are told', async () => {
   browser = await Browser.launch({ width: 390, height: 844 });
   const { page } = browser;
