@@ -79,6 +79,9 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   await reached('text-1', 'kept');
   const first = statSync(join(parts, 'text-1.webm')).mtimeMs;
   expect(await page.textContent('#meters')).toContain('of 45');
+  await page.selectOption('#language', 'de');
+  expect(await page.textContent('#clock')).toBe(''); // nothing of what is over comes back in another language
+  await page.selectOption('#language', 'en');
   expect(await page.isDisabled('#go')).toBe(false);
   expect(await page.textContent('#first')).toBe('It can be made now; more parts make it better.');
   await page.click('[data-part=text-1]');

@@ -255,7 +255,7 @@ export class Room {
     const isText = part.id.startsWith('text-');
     words.write(byId(root, 'task'), say(`studio.task.${isText ? 'text' : part.id}` as Key));
     byId(root, 'text').textContent = part.id === UPLOAD ? '' : part.text;
-    byId(root, 'clock').textContent = '';
+    words.write(byId(root, 'clock'), '');
     const record = byId<HTMLButtonElement>(root, 'record');
     words.write(record, say(camera.isRecording ? 'studio.stop' : part.state === 'missing' ? 'studio.record' : 'studio.record.again'));
     record.classList.toggle('running', camera.isRecording);
