@@ -128,6 +128,9 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   expect(await again.isVisible('#view')).toBe(false);
   expect(await again.isVisible('#meters')).toBe(false);
   await expect.poll(() => isSeen('#task'), PATIENCE).toBe(true);
+  await again.click('#back');
+  await again.click('#people button');
+  await again.waitForSelector('[data-part=upload][aria-pressed=true]'); // nothing else is asked for
   await again.click('#remove');
   await again.waitForSelector('[data-part=text-2][aria-pressed=true]');
   expect(await again.isVisible('#open')).toBe(true);

@@ -76,7 +76,8 @@ export class Room {
     const other = status.name !== this.status?.name;
     this.status = status;
     byId(this.root, 'text').lang = status.language;
-    if (other || (this.current === UPLOAD && !this.isBrought)) this.current = this.next(status);
+    if (other && this.isBrought) this.current = UPLOAD;
+    else if (other || (this.current === UPLOAD && !this.isBrought)) this.current = this.next(status);
     this.write();
   }
 
