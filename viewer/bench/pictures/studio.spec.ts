@@ -33,7 +33,7 @@ test('studio', async () => {
   await album.shoot(page, 'consent, ticked');
   await page.click('#begin');
   await page.click('#open');
-  await page.waitForSelector('#guide:not(:empty)');
+  await page.waitForSelector('#guide[data-word]');
   await record('consent', 5, 'consent, spoken');
   await record('text-1', 9, 'a text');
   await record('left', 4, 'a turn of the head');

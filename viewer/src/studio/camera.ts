@@ -19,6 +19,7 @@ export class Camera {
   private readonly canvas = document.createElement('canvas');
   private stream: MediaStream | null = null;
   private recorder: MediaRecorder | null = null;
+  private stopped = Promise.resolve(); // the latest recording has handed over its last piece
   private readonly onLost: () => void;
 
   /** @param onLost the camera has ended by itself */
@@ -55,7 +56,9 @@ export class Camera {
     await this.view.play().catch(() => {}); // it goes on by itself once it may
   }
 
+  /** Turns the camera off; a recording ends with it. */
   close(): void {
+    void this.stop();
     for (const track of this.stream?.getTracks() ?? []) track.stop();
     this.stream = this.view.srcObject = null;
   }
@@ -70,13 +73,14 @@ export class Camera {
   }
 
   /** Ends the recording; the last piece has been handed over then. */
-  async stop(): Promise<void> {
+  stop(): Promise<void> {
     const recorder = this.recorder;
     this.recorder = null;
-    if (!recorder || recorder.state === 'inactive') return;
-    const stopped = new Promise((resolve) => recorder.addEventListener('stop', resolve, { once: true }));
-    recorder.stop();
-    await stopped;
+    if (recorder && recorder.state !== 'inactive') {
+      this.stopped = new Promise((resolve) => recorder.addEventListener('stop', () => resolve(), { once: true }));
+      recorder.stop();
+    }
+    return this.stopped;
   }
 
   /** What the camera sees now, as a small JPEG; null before the first picture. */

@@ -17,6 +17,7 @@ import { Recordings, Refusal, type Overview, type Status } from './recordings.ts
 import { Room } from './room.ts';
 
 const UNADMITTED = 401;
+const UNKNOWN = 404;
 
 addTexts(studio);
 const root = document.documentElement;
@@ -42,6 +43,21 @@ function problem(sentence: Sentence | null): void {
 
 function failed(error: unknown): void {
   problem(sentenceOf(error));
+  if (isUnknown(error)) void leaveIfGone().catch(failed);
+}
+
+function isUnknown(error: unknown): boolean {
+  return error instanceof Refusal && error.status === UNKNOWN;
+}
+
+/** Leaves a person who was deleted elsewhere, in another tab or by hand. */
+async function leaveIfGone(): Promise<void> {
+  const name = person?.name;
+  if (name === undefined) return;
+  const isGone = await recordings.status(name).then(() => false, isUnknown);
+  if (!isGone || person?.name !== name) return;
+  await showStart();
+  problem(say('studio.deleted', { name }));
 }
 
 function show(...sections: string[]): void {
@@ -55,6 +71,7 @@ function showPerson(status: Status): void {
   const state = status.making?.state;
   show(...(state ? ['making'] : []), ...(state === 'running' ? [] : ['room']));
   words.write(byId(root, 'title'), status.name);
+  words.write(byId(root, 'delete'), say('studio.delete', { name: status.name }));
   room.show(status);
   making.show(status);
 }

@@ -91,7 +91,7 @@ export class MakingView {
     this.showFace(status.name, making.faces);
     const decibels = making.decibels === null ? '' : say('studio.making.decibels', { n: Math.round(10 * making.decibels) / 10 });
     words.write(byId(root, 'decibels'), decibels);
-    byId(root, 'halt').hidden = !isRunning;
+    byId(root, 'halt').hidden = byId(root, 'closing').hidden = !isRunning;
     byId(root, 'again').hidden = isRunning || making.state === 'made';
     byId(root, 'talk').hidden = !status.avatar || isRunning;
     byId(root, 'better').hidden = making.advice.length === 0;

@@ -76,12 +76,14 @@ export class Room {
     const other = status.name !== this.status?.name;
     this.status = status;
     byId(this.root, 'text').lang = status.language;
-    if (other) this.current = this.next(status);
+    if (other && this.isBrought) this.current = UPLOAD;
+    else if (other || (this.current === UPLOAD && !this.isBrought)) this.current = this.next(status);
     this.write();
   }
 
-  /** Leaves the person; the camera goes off. */
+  /** Leaves the person; the camera goes off, and of a part that is being recorded stays what was sent. */
   leave(): void {
+    this.sending = null;
     this.camera.close();
     this.status = null;
   }
@@ -107,6 +109,7 @@ export class Room {
   private async open(): Promise<void> {
     this.ports.problem(null);
     await this.camera.open();
+    this.hush();
     this.write();
   }
 
@@ -115,7 +118,7 @@ export class Room {
     const { name } = this.status!;
     this.sending = new Sending(this.ports.recordings, name, this.current, (lost) => this.ports.problem(lost ? say('studio.lost') : null));
     [this.began, this.most] = [performance.now(), 0];
-    this.camera.record(this.sending, (error) => void this.breakOff(error));
+    this.camera.record(this.sending, (error) => void this.breakOff(error).catch(this.ports.failed));
     this.write();
   }
 
@@ -145,7 +148,7 @@ export class Room {
   }
 
   private loseCamera(): void {
-    if (this.sending) void this.finish();
+    if (this.sending) void this.finish().catch(this.ports.failed);
     this.ports.problem(say('studio.camera.lost'));
     this.write();
   }
@@ -178,10 +181,13 @@ export class Room {
         await sending.add(file.slice(at, at + SLICE));
       }
       words.write(arrived, say('studio.saving'));
-      changed(await sending.keep());
+      const status = await sending.keep();
+      this.current = UPLOAD; // what is wrong with it is read at once
+      changed(status);
     } finally {
       arrived.hidden = true;
     }
+    this.reveal();
   }
 
   private async make(): Promise<void> {
@@ -196,8 +202,21 @@ export class Room {
     if (this.camera.isRecording) return;
     this.current = id;
     this.most = 0;
-    this.ports.words.write(byId(this.root, 'guide'), ''); // what was said was of another part
+    this.hush();
     this.write();
+    this.reveal();
+  }
+
+  /** Scrolls to what the current part asks, if it is not seen. */
+  private reveal(): void {
+    this.root.querySelector('.set')!.scrollIntoView({ block: 'nearest' });
+  }
+
+  /** Says nothing of pictures that are past; instead, if anything, that there are none. */
+  private hush(instead?: Key): void {
+    const guide = byId(this.root, 'guide');
+    this.ports.words.write(guide, instead ? say(instead) : '');
+    delete guide.dataset.word;
   }
 
   private async look(): Promise<void> {
@@ -227,7 +246,7 @@ export class Room {
     if (!this.camera.isRecording) return;
     const seconds = Math.floor((performance.now() - this.began) / 1000);
     this.ports.words.write(byId(this.root, 'clock'), say('studio.recording', { n: seconds }));
-    if (seconds >= LONGEST) void this.finish();
+    if (seconds >= LONGEST) void this.finish().catch(this.ports.failed);
   }
 
   private write(): void {
@@ -235,25 +254,27 @@ export class Room {
     if (!status || !part) return;
     const { words } = this.ports;
     const isText = part.id.startsWith('text-');
-    words.write(byId(root, 'task'), part.id === UPLOAD ? '' : say(`studio.task.${isText ? 'text' : part.id}` as Key));
+    words.write(byId(root, 'task'), say(`studio.task.${isText ? 'text' : part.id}` as Key));
     byId(root, 'text').textContent = part.id === UPLOAD ? '' : part.text;
-    byId(root, 'clock').textContent = '';
+    words.write(byId(root, 'clock'), '');
     const record = byId<HTMLButtonElement>(root, 'record');
     words.write(record, say(camera.isRecording ? 'studio.stop' : part.state === 'missing' ? 'studio.record' : 'studio.record.again'));
     record.classList.toggle('running', camera.isRecording);
     record.hidden = !camera.isOpen || part.id === UPLOAD;
-    byId(root, 'open').hidden = camera.isOpen;
+    byId(root, 'open').hidden = camera.isOpen || part.id === UPLOAD;
+    byId(root, 'view').hidden = part.id === UPLOAD;
     byId(root, 'salvage').hidden = camera.isRecording || part.state !== 'broken';
     byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || this.isComplete(status);
     byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
     byId(root, 'advice').replaceChildren(...(part.advice ?? []).map(item));
     byId(root, 'parts').replaceChildren(...status.parts.filter(isListed).map((one) => this.entry(one)));
     showMeters(byId(root, 'meters'), words, status.covered);
+    byId(root, 'covered').hidden = this.isBrought; // the parts do not count then
     const ready = this.isReady(status);
     byId<HTMLButtonElement>(root, 'go').disabled = !ready || camera.isRecording;
-    byId(root, 'first').hidden = ready;
+    words.write(byId(root, 'first'), ready ? this.more(status) : say('studio.make.first'));
     byId<HTMLButtonElement>(root, 'upload').disabled = !this.isAgreed;
-    if (!camera.isOpen) words.write(byId(root, 'guide'), '');
+    if (!camera.isOpen) this.hush('studio.camera.off');
     byId(root, 'reached').hidden ||= !camera.isOpen;
   }
 
@@ -264,6 +285,16 @@ export class Room {
 
   private isReady({ parts }: Status): boolean {
     return this.isAgreed && parts.filter(({ state }) => state === 'kept').length > 1;
+  }
+
+  /** Whether there is a video that takes the place of the parts. */
+  private get isBrought(): boolean {
+    return this.status!.parts.some(({ id, state }) => id === UPLOAD && state === 'kept');
+  }
+
+  /** What is said of an avatar that could be made: that more would be better, as long as it would. */
+  private more({ covered }: Status): Sentence {
+    return this.isBrought || covered.seconds >= covered.enough ? '' : say('studio.make.more');
   }
 
   private isComplete({ parts }: Status): boolean {

@@ -1,6 +1,7 @@
 import { Refusal, type Recordings, type Status } from './recordings.ts';
 
 const AGAIN = 1000; // ms after which an unanswered request is made once more
+const HEAD = 16; // bytes by which the server knows a video: browsers begin some with a piece of a single byte
 
 /** Sends a part to the server piece by piece, in order; what is not taken stays here until it is. */
 export class Sending {
@@ -11,6 +12,7 @@ export class Sending {
   private readonly onLost: (lost: boolean) => void;
   private queue: Promise<void> = Promise.resolve();
   private sent = 0;
+  private held = new Blob(); // the beginning, as long as it is too short to be known
 
   /** @param onLost the server does not answer, or does again */
   constructor(recordings: Recordings, name: string, part: string, onLost: (lost: boolean) => void) {
@@ -30,10 +32,17 @@ export class Sending {
   /** Waits until everything has arrived, and lets it be the part. */
   async keep(): Promise<Status> {
     await this.queue;
+    await this.deliver(this.held);
     return this.untilAnswered(() => this.recordings.keep(this.name, this.part, this.take));
   }
 
   private async send(piece: Blob): Promise<void> {
+    this.held = new Blob([this.held, piece]);
+    if (this.sent > 0 || this.held.size >= HEAD) await this.deliver(this.held);
+  }
+
+  private async deliver(piece: Blob): Promise<void> {
+    this.held = new Blob();
     if (piece.size === 0) return;
     await this.untilAnswered(() => this.recordings.append(this.name, this.part, this.take, this.sent, piece));
     this.sent += piece.size;

@@ -41,30 +41,44 @@ beforeEach(() => {
 afterEach(() => void vi.useRealTimers());
 
 test('pieces go in order, each behind those before', async () => {
-  void sending.add(new Blob(['one']));
+  void sending.add(new Blob(['how a video begins']));
   void sending.add(new Blob(['']));
   void sending.add(new Blob(['three']));
   expect(await sending.keep()).toEqual({ name: 'Ida' });
-  expect(server.calls).toEqual(['Ida left 0 one', 'Ida left 3 three', 'keep']);
+  expect(server.calls).toEqual(['Ida left 0 how a video begins', 'Ida left 18 three', 'keep']);
   expect(lost).toEqual([]);
+});
+
+test('a beginning too short to be known as a video goes together with what follows', async () => {
+  void sending.add(new Blob(['h']));
+  void sending.add(new Blob(['ow']));
+  await sending.add(new Blob([' a video begins']));
+  await sending.add(new Blob(['.']));
+  expect(server.calls).toEqual(['Ida left 0 how a video begins', 'Ida left 18 .']);
+});
+
+test('what stays too short is sent at the end, and the server says what it is', async () => {
+  void sending.add(new Blob(['one']));
+  await sending.keep();
+  expect(server.calls).toEqual(['Ida left 0 one', 'keep']);
 });
 
 test('a server that does not answer gets the same piece again until it does', async () => {
   server.faults.push(NO_ANSWER, NO_ANSWER);
-  void sending.add(new Blob(['one']));
+  void sending.add(new Blob(['how a video begins']));
   const kept = sending.keep();
   await vi.advanceTimersByTimeAsync(2500);
   await kept;
-  expect(server.calls).toEqual(['Ida left 0 one', 'Ida left 0 one', 'Ida left 0 one', 'keep']);
+  expect(server.calls).toEqual(['Ida left 0 how a video begins', 'Ida left 0 how a video begins', 'Ida left 0 how a video begins', 'keep']);
   expect(lost).toEqual([true, false]);
 });
 
 test('a piece that is refused ends it, and what follows is not sent', async () => {
   server.faults.push(new Refusal(507, 'full', 'the disk is full.'));
-  await expect(sending.add(new Blob(['one']))).rejects.toThrow(/^The disk is full/);
+  await expect(sending.add(new Blob(['how a video begins']))).rejects.toThrow(/^The disk is full/);
   await expect(sending.add(new Blob(['two']))).rejects.toThrow(Refusal);
   await expect(sending.keep()).rejects.toThrow(Refusal);
-  expect(server.calls).toEqual(['Ida left 0 one']);
+  expect(server.calls).toEqual(['Ida left 0 how a video begins']);
 });
 
 test('a refusal is said in the words of the page, where it has some', () => {
