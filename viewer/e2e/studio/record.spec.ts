@@ -143,7 +143,6 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   expect(readdirSync(folder)).toEqual(['notes.txt']);
 }, 120_000);
 
-<<<<<<< HEAD
 test.skipIf(!demo)('a voice is agreed to by a tick of its own, off at first, in the language of the page', async () => {
   const page = await open();
   await page.waitForSelector('#start:visible');
@@ -175,7 +174,7 @@ test.skipIf(!demo)('a voice is agreed to by a tick of its own, off at first, in 
     await asking.stop();
   }
 }, 60_000);
-=======
+
 test.skipIf(!demo)('who leaves while it records, and who was deleted in another tab', async () => {
   const page = await open();
   await page.fill('#name', 'Eva');
@@ -200,7 +199,6 @@ test.skipIf(!demo)('who leaves while it records, and who was deleted in another 
   await page.waitForSelector('#start:visible');
   await expect.poll(() => page.textContent('#problem'), PATIENCE).toBe('Everything of Eva is gone.');
 }, 120_000);
->>>>>>> 37f84d62fb80844541d1b426c1eccabafa4ac664
 
 test.skipIf(!demo)('a camera that is not given, and a server that is gone, are told', async () => {
   browser = await Browser.launch({ width: 390, height: 844 });
