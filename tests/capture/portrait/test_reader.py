@@ -222,3 +222,10 @@ def test_half_a_picture_of_a_parsing(folder):
     capture = open_capture(folder)
     with pytest.raises(CaptureError, match=r"0\.png cannot be read"):
         capture.mask(0, 0)
+
+
+@pytest.mark.parametrize("focal", [10**400, -(10**400), float("nan"), "1", None])
+def test_a_focal_length_that_is_no_number_in_pixels_is_told(folder, focal):
+    file = folder / "transforms_train.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"focal_len": focal}))
+    _fails(folder, "transforms_train.json", "must be numbers in pixels")

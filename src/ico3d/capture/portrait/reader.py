@@ -224,7 +224,8 @@ class TalkingPortrait(RecordedCapture):
             width, height = picture.size
         file = self.path / "transforms_train.json"
         values = [transforms.get(k, d) for k, d in _lens_defaults(width, height)]
-        if not all(isinstance(v, int | float) and np.isfinite(v) for v in values):
+        # Whole numbers of JSON may be too large for a float; NaN is no number between these either.
+        if not all(isinstance(v, int | float) and abs(v) < 1e6 for v in values):
             raise CaptureError(f"{file}: focal_len, cx and cy must be numbers in pixels.")
         focal, x, y = values
         if abs(x - width / 2) > width / 4 or abs(y - height / 2) > height / 4:
