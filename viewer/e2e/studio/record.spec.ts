@@ -194,10 +194,18 @@ test.skipIf(!demo)('who leaves while it records, and who was deleted in another 
   await other.click('#people button');
   await other.click('#delete');
   await other.waitForSelector('#start:visible');
+  await other.fill('#name', 'Ola');
+  await other.check('#agreed');
+  await other.click('#begin');
+  await other.waitForSelector('#room:visible');
   await other.close();
   await page.click('#salvage');
   await page.waitForSelector('#start:visible');
   await expect.poll(() => page.textContent('#problem'), PATIENCE).toBe('Everything of Eva is gone.');
+  await page.click('#people button');
+  await page.waitForSelector('#room:visible');
+  expect(await page.textContent('#title')).toBe('Ola');
+  expect(await page.isVisible('#problem')).toBe(false); // that was of somebody else
 }, 120_000);
 
 test.skipIf(!demo)('a camera that is not given, and a server that is gone, are told', async () => {

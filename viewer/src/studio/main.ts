@@ -88,7 +88,10 @@ async function showStart(): Promise<void> {
     const row = document.createElement('li');
     const button = document.createElement('button');
     button.textContent = name;
-    button.onclick = () => void recordings.status(name).then(showPerson).catch(failed);
+    button.onclick = () => {
+      problem(null);
+      void recordings.status(name).then(showPerson).catch(failed);
+    };
     row.append(button);
     return row;
   });
