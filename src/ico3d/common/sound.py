@@ -1,4 +1,4 @@
-"""Checks what the header of a sound file claims, before the sound is decoded or resampled.
+"""Checks what the header of a sound file claims, before it is decoded or resampled; writes WAV.
 
 A header of 44 bytes can claim any rate and length: a file of two kilobytes at 1 Hz claims half an
 hour, which takes 100 MB once resampled. Code that accepts sound from outside calls `fault` first.
@@ -7,10 +7,15 @@ hour, which takes 100 MB once resampled. Code that accepts sound from outside ca
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 # (soundfile is untyped)
 
+import io
 import struct
 import wave
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 LOWEST_RATE, HIGHEST_RATE = 4_000, 384_000  # samples per second
 MOST_CHANNELS = 64
@@ -92,3 +97,14 @@ def wav_claim(head: bytes) -> Claim | None:
     if (riff, wave, form) != (b"RIFF", b"WAVE", b"fmt "):
         return None
     return Claim(rate, channels, width=bits // 8)
+
+
+def wav_bytes(samples: NDArray[np.floating[Any]], rate: int) -> bytes:
+    """A WAV file, mono with 16 bits, of samples (S,) in [-1, 1]; what is beyond is cut off."""
+    data = io.BytesIO()
+    with wave.open(data, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(rate)
+        file.writeframes((np.clip(samples, -1, 1) * 32767).astype("<i2").tobytes())
+    return data.getvalue()

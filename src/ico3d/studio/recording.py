@@ -5,7 +5,6 @@ The layout is described in `docs/captures/synthetic.md`, "Synthetic captures".
 
 import io
 import json
-import wave
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -19,6 +18,7 @@ from safetensors.numpy import save
 from ico3d.capture.synthetic import FORMAT, VERSION
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
+from ico3d.common.sound import wav_bytes
 from ico3d.errors import SettingsError
 from ico3d.studio.acting.embody import embodied
 from ico3d.studio.acting.gaze import GAZES, looking
@@ -129,7 +129,7 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     backdrops = [backdrop(camera, lamps) for camera in cameras]
     for camera, image in zip(cameras, backdrops, strict=True):
         _write_png(out / "backgrounds" / f"{camera.name}.png", image)
-    _write_sound(out / "audio.wav", acted.samples)
+    write_atomic(out / "audio.wav", wav_bytes(acted.samples, SOUND_RATE))
     _write_frames(out / "frames.safetensors", subject, acted, views, recording.seed)
     studio = Studio(subject, lamps, recording.clothes)
     _draw(studio, acted, cameras, backdrops, views, out, workers)
@@ -253,16 +253,6 @@ def _write_png(path: Path, values: np.ndarray) -> None:
     Image.fromarray((np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)).save(
         data, format="PNG", compress_level=4
     )
-    write_atomic(path, data.getvalue())
-
-
-def _write_sound(path: Path, samples: np.ndarray) -> None:
-    data = io.BytesIO()
-    with wave.open(data, "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(SOUND_RATE)
-        file.writeframes((np.clip(samples, -1, 1) * 32767).astype("<i2").tobytes())
     write_atomic(path, data.getvalue())
 
 

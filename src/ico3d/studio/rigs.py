@@ -67,9 +67,7 @@ def camera_rings(count: int, height: int) -> tuple[Camera, ...]:
         count: Number of cameras.
         height: Height of the pictures in pixels.
     """
-    elevations = [RINGS[(index + 1) % len(RINGS)] for index in range(count)]
-    ways = [_towards(360.0 * index / count, e) for index, e in enumerate(elevations)]
-    return tuple(_portrait_camera(BODY, way, height, i) for i, way in enumerate(ways))
+    return _on_rings(BODY, 360.0 * np.arange(count) / count, height)
 
 
 def cameras_before(count: int, height: int, first: int) -> tuple[Camera, ...]:
@@ -81,19 +79,23 @@ def cameras_before(count: int, height: int, first: int) -> tuple[Camera, ...]:
         first: Number that the first of these cameras has as its name.
     """
     azimuths = UPPER_ARC * (2 * (np.arange(count) + 0.5) / max(count, 1) - 1)
-    elevations = [RINGS[(index + 1) % len(RINGS)] for index in range(count)]
-    ways = [_towards(a, e) for a, e in zip(azimuths, elevations, strict=True)]
-    return tuple(_portrait_camera(UPPER_BODY, way, height, first + i) for i, way in enumerate(ways))
+    return _on_rings(UPPER_BODY, azimuths, height, first)
 
 
-def _portrait_camera(framing: Framing, towards: np.ndarray, height: int, number: int) -> Camera:
-    """A camera beside a standing person, in the direction `towards` (3,) from them."""
+def _on_rings(
+    framing: Framing, azimuths: np.ndarray, height: int, first: int = 0
+) -> tuple[Camera, ...]:
+    """Cameras around a standing person at azimuths (C,) in degrees, on one ring after the other."""
     width = 2 * round(ASPECT * height / 2)
     focal = height * BODY_DISTANCE / framing.height
     intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     target = np.array([0.0, framing.aim, 0.0])
-    pose = look_at(target + BODY_DISTANCE * towards, target)
-    return Camera(width, height, intrinsics, pose, str(number))
+    cameras = []
+    for index, azimuth in enumerate(azimuths):
+        towards = _towards(float(azimuth), RINGS[(index + 1) % len(RINGS)])
+        pose = look_at(target + BODY_DISTANCE * towards, target)
+        cameras.append(Camera(width, height, intrinsics, pose, str(first + index)))
+    return tuple(cameras)
 
 
 def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:

@@ -6,18 +6,9 @@ import pytest
 from ico3d.avatar.embodying.garments import GARMENTS, garments_of
 from ico3d.avatar.embodying.outfits import OUTFITS, dressed
 from ico3d.avatar.embodying.surfaces import Surfaces, main_joints, surfaces_of
-from ico3d.bundle.format import Bundle
-from ico3d.bundle.packaged import FILE
 from ico3d.bundle.skinned.posing import posed, recorded_pose
 from ico3d.errors import BundleError
 from ico3d.motion.roles import cast
-
-
-@pytest.fixture(scope="module")
-def body():
-    found = Bundle.open(FILE).skinned
-    assert found is not None
-    return found
 
 
 @pytest.fixture(scope="module")

@@ -66,7 +66,7 @@ def embody(
     """
     given, _ = head.require_head()
     own, poses = body.require_head()
-    skinned = body_in(body, look)
+    skinned = body_in(body)
     faces = _landmarks(head, given), _landmarks(body, own)
     matrix, rest = canonical_from_head(faces[1], faces[0])
     report(fit_in_words(matrix, rest))

@@ -32,8 +32,7 @@ def sound_advice(sound: Sound | None) -> Iterator[Advice]:
         ))  # fmt: skip
         return
     pieces = sound.samples[: count * length].reshape(count, length)  # (P, n)
-    loudness = 20 * np.log10(np.sqrt((pieces.astype(np.float64) ** 2).mean(1)) + 1e-9)  # (P,)
-    loud, floor = np.quantile(loudness, [0.9, 0.1])
+    loud, floor = np.quantile(loudness(pieces), [0.9, 0.1])
     if loud < SILENT:
         yield Advice("sound", "refused", (
             "the sound is silent, and an avatar learns from it how your lips follow your voice: "
@@ -51,6 +50,11 @@ def sound_advice(sound: Sound | None) -> Iterator[Advice]:
             "noise is nearly as loud as the voice, or there is no pause: find a quiet room, and "
             "be silent for a moment between sentences."
         ))  # fmt: skip
+
+
+def loudness(pieces: np.ndarray) -> np.ndarray:
+    """(...) decibels of full scale of pieces of sound (..., n)."""
+    return 20 * np.log10(np.sqrt((pieces.astype(np.float64) ** 2).mean(-1)) + 1e-9)
 
 
 def clips(pieces: np.ndarray) -> np.ndarray:

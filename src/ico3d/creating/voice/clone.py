@@ -2,7 +2,6 @@
 
 import importlib.util
 import tempfile
-import wave
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
 from ico3d.capture.video import read_sound
 from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import is_stated
+from ico3d.common.sound import wav_bytes
 from ico3d.creating.events import Tell, Voiced
 from ico3d.creating.settings import CreateSettings
 from ico3d.creating.workplace import Workplace
@@ -101,9 +101,7 @@ def heard(samples: np.ndarray, tell: Callable[[Path], np.ndarray]) -> np.ndarray
     """What `tell` says of a sound at `RATE`, which is a file only meanwhile."""
     with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
         path = Path(folder) / "voice.wav"
-        with wave.open(str(path), "wb") as file:
-            file.setparams((1, 2, RATE, 0, "NONE", ""))
-            file.writeframes((samples * 32767).astype("<i2").tobytes())
+        path.write_bytes(wav_bytes(samples, RATE))
         return tell(path)
 
 

@@ -8,7 +8,7 @@ import soxr
 from ico3d.capture.capture import Sound
 from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
-from ico3d.creating.looking.sound_checks import ABOVE_NOISE, SILENT, clips
+from ico3d.creating.looking.sound_checks import ABOVE_NOISE, SILENT, clips, loudness
 
 FRAME = 512
 """Samples at 16 kHz of which Silero says whether they are speech: 32 ms."""
@@ -97,14 +97,9 @@ def stretches(speech: np.ndarray, step: float) -> list[tuple[float, float]]:
     return [(begin, end) for begin, end in found if end - begin >= SHORTEST]
 
 
-def loudness(samples: np.ndarray) -> float:
-    """Loudness of a sound, decibels of full scale."""
-    return 20 * float(np.log10(np.sqrt(np.mean(samples.astype(np.float64) ** 2)) + 1e-9))
-
-
 def _cleanest(sound: Sound, found: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The stretches that stand most above the noise, by time; none that is noisy or clipped."""
-    above = {span: loudness(_cut(sound, span)) - _noise(sound, span) for span in found}
+    above = {span: float(loudness(_cut(sound, span))) - _noise(sound, span) for span in found}
     taken: list[tuple[float, float]] = []
     for begin, end in sorted(found, key=lambda span: -above[span]):
         room = MOST - sum(b - a for a, b in taken)
@@ -120,7 +115,7 @@ def _noise(sound: Sound, span: tuple[float, float]) -> float:
     near = _cut(sound, (max(span[0] - AROUND, 0.0), span[1] + AROUND))
     length = round(PIECE * sound.rate)
     pieces = near[: len(near) // length * length].reshape(-1, length)  # (P, n)
-    return float(np.quantile([loudness(piece) for piece in pieces], SOFTEST))
+    return float(np.quantile(loudness(pieces), SOFTEST))
 
 
 def _cut(sound: Sound, span: tuple[float, float]) -> np.ndarray:
@@ -130,7 +125,7 @@ def _cut(sound: Sound, span: tuple[float, float]) -> np.ndarray:
 
 def _levelled(samples: np.ndarray, rate: int) -> np.ndarray:
     """A stretch as loud as all others, without clicks at its ends."""
-    gain = 10 ** ((LEVEL - loudness(samples)) / 20)
+    gain = 10 ** ((LEVEL - float(loudness(samples))) / 20)
     gain = min(gain, PEAK / max(float(np.abs(samples).max()), 1e-9))
     fade = np.minimum(np.arange(len(samples)) / (FADE * rate), 1)
     return (samples * gain * fade * fade[::-1]).astype(np.float32)

@@ -24,13 +24,6 @@ OTHERS = ("slender", "sturdy")
 
 
 @pytest.fixture(scope="module")
-def body():
-    found = Bundle.open(FILE).skinned
-    assert found is not None
-    return found
-
-
-@pytest.fixture(scope="module")
 def builds(body):
     return {"medium": body} | {build: reshaped(body, build) for build in OTHERS}
 

@@ -25,6 +25,25 @@ def models(home):
     return folder
 
 
+@pytest.fixture(scope="session")
+def fake():
+    """A stand-in of OpenVoice's documented API; needs torch."""
+    from support.chat import fake_openvoice
+
+    return fake_openvoice
+
+
+@pytest.fixture
+def installed(fake, monkeypatch, models):
+    """The fake is installed; gives the folder of its weights."""
+    from ico3d.chat.services.voice import openvoice
+
+    fake.install(monkeypatch)
+    fake.write_weights(models)
+    openvoice.engine.cache_clear()
+    return models
+
+
 @pytest.fixture
 def say():
     """Has a voice say texts; returns its sound, (S,) int16 at 24 kHz, and the errors it met."""

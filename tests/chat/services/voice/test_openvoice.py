@@ -20,22 +20,6 @@ LANGUAGES = openvoice.LANGUAGES
 CONSENT = {"consent": "I agree that my voice speaks here.", "consent_by": "Änne Müller"}
 
 
-@pytest.fixture(scope="module")
-def fake():
-    from support.chat import fake_openvoice
-
-    return fake_openvoice
-
-
-@pytest.fixture
-def installed(fake, monkeypatch, models):
-    """The fake is installed; gives the folder of its weights."""
-    fake.install(monkeypatch)
-    fake.write_weights(models)
-    openvoice.engine.cache_clear()
-    return models
-
-
 @pytest.fixture
 def reference(tmp_path):
     path = tmp_path / "me.wav"

@@ -31,22 +31,6 @@ OFFLINE = {"recognition": Choice("pocketsphinx"), "language": Choice("persona-no
 BEST, ESPEAK = (ChatSettings(**OFFLINE, voice=Choice(use)) for use in ("best", "espeak-ng"))
 
 
-@pytest.fixture
-def fake():
-    from support.chat import fake_openvoice
-
-    return fake_openvoice
-
-
-@pytest.fixture
-def installed(fake, monkeypatch, models):
-    """The fake is installed; gives the folder of its weights."""
-    fake.install(monkeypatch)
-    fake.write_weights(models)
-    openvoice.engine.cache_clear()
-    return models
-
-
 @pytest.fixture(scope="module")
 def voiced_path(bundle_path, tmp_path_factory):
     """A bundle with a cloned voice."""
