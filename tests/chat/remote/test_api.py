@@ -25,6 +25,7 @@ from support.chat.remote import (
     service_app,
     serving,
 )
+from support.chat.serving import visiting
 
 pytestmark = pytest.mark.slow
 
@@ -116,7 +117,7 @@ def test_what_is_no_sound_is_one_sentence(data):
 
 async def test_a_door_with_a_key_and_limits():
     app = service_app("voice", make_voice, Limits(megabytes=0.001), key="sesame")
-    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+    async with serving(app) as url, visiting(url) as plain:
         assert (await plain.get("/health")).json() == {
             "ok": True,
             "kind": "voice",
@@ -143,7 +144,7 @@ async def endless():
 
 async def test_a_body_without_a_length_is_limited_too():
     app = service_app("voice", make_voice, Limits(megabytes=0.01))
-    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+    async with serving(app) as url, visiting(url) as plain:
         kind = {"Content-Type": "application/json"}
         answer = await plain.post("/v1/audio/speech", content=endless(), headers=kind)
         assert answer.status_code == 413
@@ -184,7 +185,7 @@ class Odd(FrameProcessor):
 )
 async def test_what_goes_wrong_inside_is_an_answer(way, status, sentence):
     app = service_app("language", lambda: Odd(way), Limits(seconds=0.5 if status == 504 else 20))
-    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+    async with serving(app) as url, visiting(url) as plain:
         body = {"model": "any", "messages": [{"role": "user", "content": "hi"}]}
         for stream in (False, True):
             answer = await plain.post("/v1/chat/completions", json=body | {"stream": stream})
@@ -205,7 +206,7 @@ async def test_a_stream_that_breaks_is_not_taken_for_whole():
 
 async def test_more_requests_than_allowed_are_told_to_wait():
     app = service_app("language", lambda: Odd("hang"), Limits(requests=1, seconds=2.0))
-    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+    async with serving(app) as url, visiting(url) as plain:
         body = {"model": "any", "messages": [{"role": "user", "content": "hi"}]}
         first = asyncio.create_task(plain.post("/v1/chat/completions", json=body))
         await asyncio.sleep(0.3)
@@ -225,7 +226,7 @@ async def test_a_request_that_never_comes_gives_its_place_back(monkeypatch):
         kind = "Content-Type: application/json", "Content-Length: 1000"
         writer.write("\r\n".join((*head, *kind, "", "{")).encode())
         await asyncio.sleep(0.2)
-        async with httpx.AsyncClient(base_url=url) as http:
+        async with visiting(url) as http:
             assert (await http.post("v1/chat/completions", json=ask)).status_code == 429
             assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
             assert (await http.post("v1/chat/completions", json=ask)).status_code == 200
@@ -244,7 +245,7 @@ async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
             head = "POST /v1/audio/speech HTTP/1.1", f"Host: {address.netloc.decode()}"
             kind = "Content-Type: application/json", f"Content-Length: {len(body)}"
             silent.send("\r\n".join((*head, *kind, "", "")).encode() + body)
-            async with httpx.AsyncClient(base_url=url) as http, asyncio.timeout(60):
+            async with visiting(url) as http, asyncio.timeout(60):
                 await asyncio.sleep(0.2)
                 assert (await http.get("v1/models")).status_code == 429
                 while (await http.get("v1/models")).status_code == 429:
@@ -255,7 +256,7 @@ async def test_a_request_of_thousands_of_tools_or_messages_is_refused():
     said, tool = {"role": "user", "content": "hi"}, {"function": {"name": "a"}}
     async with (
         serving(service_app("language", make_language)) as url,
-        httpx.AsyncClient(base_url=url) as http,
+        visiting(url) as http,
     ):
         for ask in ({"messages": [said], "tools": [tool] * 129}, {"messages": [said] * 10_001}):
             answer = await http.post("v1/chat/completions", json=ask)

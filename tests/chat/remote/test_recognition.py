@@ -4,7 +4,6 @@ import io
 import struct
 import tracemalloc
 
-import httpx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,6 +13,7 @@ from ico3d.chat.remote.limits import Limits
 from ico3d.chat.remote.recognition import read_wav
 from ico3d.errors import ProtocolError
 from support.chat.remote import service_app, serving
+from support.chat.serving import visiting
 
 RATE = 16_000
 LONGEST = 600  # s
@@ -39,7 +39,7 @@ class Deaf(FrameProcessor):
 async def posted(data, limits=None):
     """The answer to a file, and the most memory that it took."""
     app = service_app("recognition", Deaf, limits or Limits(seconds=3))
-    async with serving(app) as url, httpx.AsyncClient(base_url=url, timeout=60) as client:
+    async with serving(app) as url, visiting(url) as client:
         path = "v1/audio/transcriptions"
         await client.post(path, files={"file": wav(RATE, 1, 16, 3200, bytes(3200))})
         tracemalloc.start()
@@ -74,7 +74,7 @@ async def test_an_upload_that_tells_no_length_is_not_kept():
             yield bytes(MB // 4)
 
     app = service_app("recognition", Deaf, Limits(megabytes=1))
-    async with serving(app) as url, httpx.AsyncClient(base_url=url, timeout=60) as client:
+    async with serving(app) as url, visiting(url) as client:
         tracemalloc.start()
         kind = {"Content-Type": "multipart/form-data; boundary=x"}
         path = "v1/audio/transcriptions"

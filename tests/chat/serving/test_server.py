@@ -28,7 +28,7 @@ from ico3d.chat.wire.protocol import Ack, Audio, Error, Hello, Speech, Text, Wel
 from ico3d.cli import main
 from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.talking.page import open_page
-from support.chat.serving import serving
+from support.chat.serving import serving, visiting
 
 pytestmark = pytest.mark.slow
 
@@ -72,7 +72,7 @@ def test_numbers_pass_on_a_public_address_but_no_foreign_names():
 
 async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
     url, _ = served
-    async with httpx.AsyncClient(base_url=url) as client:
+    async with visiting(url) as client:
         assert (await client.get("/health")).json() == {"ok": True}
         manifest = await client.get("/bundle/manifest.json")
         assert manifest.json()["persona"]["name"] == "Random"
@@ -93,7 +93,7 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
 async def test_figures_are_on_a_port_of_their_own(typed):
     url, sessions = typed
     page, welcome = await open_page(url, microphone=False)
-    async with httpx.AsyncClient(base_url=url) as client:
+    async with visiting(url) as client:
         assert (await client.get("/metrics")).status_code == 404
         figures = await client.get(sessions.monitor.publish("127.0.0.1", 0))
         assert figures.headers["content-type"].startswith("text/plain; version=")
@@ -105,6 +105,7 @@ async def test_figures_are_on_a_port_of_their_own(typed):
         await page.wait(Error)
         await page.close()
         while "ico3d_connections 0.0" not in lines:
+            await asyncio.sleep(0.05)
             lines = (await client.get(str(figures.url))).text.splitlines()
     assert "ico3d_sessions 0.0" in lines  # it left: what only drops comes back
     assert 'ico3d_errors_total{where="protocol"} 1.0' in lines
@@ -112,7 +113,7 @@ async def test_figures_are_on_a_port_of_their_own(typed):
 
 async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
     ada = Persona("Ada", "Hello.", ("secret => The safe is open.",), "Sly.", forbidden=("keys",))
-    async with serving(bundle, persona=ada) as (url, _), httpx.AsyncClient(base_url=url) as client:
+    async with serving(bundle, persona=ada) as (url, _), visiting(url) as client:
         shown = (await client.get("/bundle/manifest.json")).json()
     assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
     own = json.loads(bundle.read("manifest.json"))
@@ -120,7 +121,7 @@ async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
 
 
 async def test_a_body_alone_is_served_without_a_conversation(body):
-    async with serving(body) as (url, _), httpx.AsyncClient(base_url=url) as client:
+    async with serving(body) as (url, _), visiting(url) as client:
         for name in ("body/0000.safetensors", "body/0001.safetensors", "manifest.json"):
             assert (await client.get(f"/bundle/{name}")).content == body.read(name)
         for name in (

@@ -18,7 +18,7 @@ from ico3d.chat.wire.protocol import Answer, End, Error, Say
 from ico3d.cli import main
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
-from support.chat.serving import TYPED, serving
+from support.chat.serving import TYPED, serving, visiting
 
 KEY = "a key that is long enough"
 SITE, OTHER = "https://site.example", "https://other.example"
@@ -181,7 +181,7 @@ async def test_a_sites_backend_gets_tokens_for_the_key(bundle):
     bearer, manifest = {"Authorization": f"Bearer {KEY}"}, "bundle/manifest.json"
     async with (
         serving(bundle, TYPED, sites=keyed) as (url, sessions),
-        httpx.AsyncClient() as client,
+        visiting() as client,
     ):
         assert not sessions.at_home  # strangers may come
         assert (await client.post(f"{url}token")).status_code == 401
@@ -218,7 +218,7 @@ async def test_keys_are_not_guessed(bundle):
     machine, other = ({"X-Forwarded-For": f"203.0.113.{number}"} for number in (7, 8))
     right = {"Authorization": f"Bearer {KEY}"}
     proxied = serving(bundle, TYPED, sites=Sites(key=KEY), proxies=["127.0.0.1"])
-    async with proxied as (url, _), httpx.AsyncClient() as client:
+    async with proxied as (url, _), visiting() as client:
 
         async def status(*headers):
             sent = {name: value for part in headers for name, value in part.items()}
@@ -232,7 +232,7 @@ async def test_keys_are_not_guessed(bundle):
 async def test_nobody_says_where_he_comes_from_but_a_proxy_that_was_named(bundle):
     async with (
         serving(bundle, TYPED, sites=Sites(key=KEY), proxies=["203.0.113.0/24"]) as (url, _),
-        httpx.AsyncClient(headers={"X-Forwarded-For": "198.51.100.7"}) as client,
+        visiting(headers={"X-Forwarded-For": "198.51.100.7"}) as client,
     ):
         asked = [await client.post(f"{url}token") for _ in range(12)]
     assert {answer.status_code for answer in asked} == {401}  # this machine's, uncounted

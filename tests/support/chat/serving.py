@@ -4,6 +4,8 @@ import asyncio
 import contextlib
 from dataclasses import replace
 
+import httpx
+
 from ico3d.chat.serving import server
 from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.settings.conversation import ChatSettings, Choice
@@ -12,6 +14,11 @@ OFFLINE = ChatSettings(language=Choice("persona-notes"))
 BROWSER = Choice("browser", {"fallback": ""})
 """Recognition for visitors who type: the server starts no decoder of its own."""
 TYPED = replace(OFFLINE, recognition=BROWSER)
+
+
+def visiting(url="", **more):
+    """An HTTP client that waits as long as a busy machine may take."""
+    return httpx.AsyncClient(base_url=url, timeout=60, **more)
 
 
 def free_port():

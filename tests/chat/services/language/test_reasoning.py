@@ -5,7 +5,6 @@ import contextlib
 import itertools
 import re
 
-import httpx
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,7 +25,7 @@ from ico3d.measure.talking.page import open_page
 from support.chat.remote import service_app
 from support.chat.remote import serving as serving_app
 from support.chat.scripted_server import Script, Thought, running
-from support.chat.serving import BROWSER, serving
+from support.chat.serving import BROWSER, serving, visiting
 
 pytestmark = pytest.mark.slow
 
@@ -210,7 +209,7 @@ async def test_a_module_gives_thoughts_apart():
     async with running(script.app()) as port:
         asked = openai.Settings(f"http://127.0.0.1:{port}/v1", "tiny")
         app = service_app("language", lambda: openai.make(asked, CONTEXT))
-        async with serving_app(app) as url, httpx.AsyncClient(base_url=url) as plain:
+        async with serving_app(app) as url, visiting(url) as plain:
             body = {"messages": [{"role": "user", "content": "hi"}]}
             answer = await plain.post("/v1/chat/completions", json=body)
     message = answer.json()["choices"][0]["message"]

@@ -3,13 +3,12 @@
 import ssl
 from datetime import UTC, datetime
 
-import httpx
 import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
 from ico3d.chat.serving.network.certificates import own_certificate
-from support.chat.serving import serving
+from support.chat.serving import serving, visiting
 
 
 async def test_page_and_socket_come_by_https(body, tmp_path):
@@ -17,7 +16,7 @@ async def test_page_and_socket_come_by_https(body, tmp_path):
     trust = ssl.create_default_context(cafile=certificate.file)
     async with serving(body, certificate=certificate) as (url, _):
         assert url.startswith("https://127.0.0.1:")
-        async with httpx.AsyncClient(verify=trust) as client:
+        async with visiting(verify=trust) as client:
             assert (await client.get(f"{url}health")).json() == {"ok": True}
         socket = connect(url.replace("https", "wss") + "echo", ssl=trust)
         async with socket as wire:

@@ -4,7 +4,6 @@ import asyncio
 import signal
 from dataclasses import replace
 
-import httpx
 import pytest
 
 from ico3d.chat.serving.running import ending
@@ -12,7 +11,7 @@ from ico3d.chat.wire.protocol import End, Speech, State, Text
 from ico3d.chat.wire.sentences import ENDING
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
-from support.chat.serving import TYPED, serving
+from support.chat.serving import TYPED, serving, visiting
 
 pytestmark = pytest.mark.slow
 LONG = Text("nothing you know of, but a long answer")
@@ -31,7 +30,7 @@ async def last_words(page):
 
 
 async def test_answers_are_finished_and_nobody_new_comes_in(bundle):
-    async with serving(bundle, TYPED) as (url, sessions), httpx.AsyncClient(base_url=url) as client:
+    async with serving(bundle, TYPED) as (url, sessions), visiting(url) as client:
         quiet, _ = await open_page(url, microphone=False)
         talking, _ = await open_page(url, microphone=False)
         await idle(quiet)
