@@ -15,6 +15,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
+from ico3d.head.neck import bent
 from ico3d.splat import harmonics
 from ico3d.splat.files.formats import read_gaussians
 from ico3d.splat.gaussians import Gaussians, cat
@@ -31,6 +32,26 @@ def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
         opacities=torch.from_numpy(opacity),
         colors=torch.from_numpy(rgb),
     )
+
+
+def swaying_head(bundle: Bundle, expression: np.ndarray, row: float) -> Gaussians:
+    """The head of a bundle without a body, in the world.
+
+    Args:
+        bundle: A bundle of a head alone.
+        expression: (B,).
+        row: At which of the head's poses, or between which.
+
+    Raises:
+        BundleError: If the bundle has no head.
+    """
+    head, poses = bundle.require_head()
+    gaussians, pose = baked_gaussians(head, expression), pose_at(poses, row)
+    if (shoulders := bundle.shoulders) is not None:
+        motion = np.linalg.inv(pose) @ pose_at(shoulders.world_from_shoulders, row)
+        share = torch.from_numpy(shoulders.share / np.float32(255))  # (N,)
+        gaussians = bent(gaussians, share, torch.from_numpy(motion))
+    return gaussians.transform(pose)
 
 
 @dataclass(frozen=True)

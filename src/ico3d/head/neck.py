@@ -12,7 +12,7 @@ from ico3d.splat.quaternions import from_matrix, multiply
 
 BENDS = (1.03, 1.35)
 """Distances from the middle of the head, relative to that of the chin, between which it bends."""
-BELOW = (0.15, 0.55)
+BELOW = (0.45, 0.85)
 """How far below the middle of the head, relative to the same, shoulders begin: hair is no neck."""
 
 
@@ -43,19 +43,19 @@ def _eased(values: Tensor, begin: float, end: float) -> Tensor:
     return share * share * (3 - 2 * share)
 
 
-def bent(gaussians: Gaussians, neck: Neck, motion: Tensor) -> Gaussians:
+def bent(gaussians: Gaussians, share: Tensor, motion: Tensor) -> Gaussians:
     """Gaussians in canonical head space whose shoulders have moved.
 
     Args:
         gaussians: N Gaussians.
-        neck: Where the neck bends.
+        share: (N,) how much of the motion each makes, 0 to 1; see `Neck.follows`.
         motion: (4, 4) rigid motion of the shoulders against the head.
 
     Returns:
         The same Gaussians, each moved by its share of the motion.
     """
     motion = motion.to(gaussians.means)
-    share = neck.follows(gaussians.means)[:, None]  # (N, 1)
+    share = share.to(gaussians.means)[:, None]  # (N, 1)
     moved = gaussians.means @ motion[:3, :3].T + motion[:3, 3]  # (N, 3)
     turn = from_matrix(motion[:3, :3])  # (4,)
     turn = turn * turn[0].sign()  # the short way

@@ -17,7 +17,6 @@ from ico3d.head.expressions import ExpressionTrack, turn_of, turn_values
 from ico3d.head.learning_rows import LearningRows
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
-from ico3d.head.neck import bent
 from ico3d.head.settings import SGD_GAINS, HeadSettings
 from ico3d.head.shoulders import shoulders_of
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
@@ -150,10 +149,8 @@ class HeadTrainer:
 
     def posed(self, gaussians: Gaussians, view: View) -> Gaussians:
         """The head's Gaussians with the shoulders where they are in a view's frame."""
-        neck = self.model.shape.neck
-        if neck is None or self._shoulders is None:
-            return gaussians
-        return bent(gaussians, neck, self._shoulders.motion(view.frame))
+        found = self._shoulders
+        return gaussians if found is None else found.posed(gaussians, view.frame)
 
     def __len__(self) -> int:
         """The number of Gaussians."""

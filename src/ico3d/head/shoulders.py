@@ -15,9 +15,10 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.common.spread import spread
-from ico3d.head.neck import Neck
+from ico3d.head.neck import Neck, bent
 from ico3d.head.shift import Seen, shift
 from ico3d.head.views import PictureCache, View, head_pose
+from ico3d.splat.gaussians import Gaussians
 
 CHIN, EARS = 8, [0, 16]
 """Multi-PIE landmarks of the chin, and where the jaw meets the ears."""
@@ -74,7 +75,7 @@ class Shoulders:
             neck: Where the neck bends.
             look: What the camera saw of the shoulders in a frame.
         """
-        self._capture, self._look = capture, look
+        self._capture, self._neck, self._look = capture, neck, look
         self._place = resting_place(capture)
         self._motions: dict[int, Tensor] = {}
         self._metres = _middle_of(capture, neck)[1]  # per pixel
@@ -82,15 +83,23 @@ class Shoulders:
         numbers = [f for f in spread(capture.num_frames, MOMENTS) if _has_pose(capture, f)]
         self._mean = np.mean([self._shift(frame) for frame in numbers], axis=0)  # (2,)
 
+    def posed(self, gaussians: Gaussians, frame: int) -> Gaussians:
+        """Gaussians in canonical head space, with the shoulders where they are in a frame."""
+        return bent(gaussians, self._neck.follows(gaussians.means), self.motion(frame))
+
     def motion(self, frame: int) -> Tensor:
         """(4, 4) motion of the shoulders in canonical head space from their place on average."""
         if frame not in self._motions:
-            place = self._place.copy()
-            away = np.append((self._shift(frame) - self._mean) * self._metres, 0)  # (3,)
-            place[:3, 3] += self._capture.cameras[0].camera_to_world[:3, :3] @ away
-            motion = np.linalg.inv(head_pose(self._capture, frame)) @ place
+            motion = np.linalg.inv(head_pose(self._capture, frame)) @ self.place(frame)
             self._motions[frame] = torch.from_numpy(motion).float()
         return self._motions[frame]
+
+    def place(self, frame: int) -> np.ndarray:
+        """(4, 4) canonical head space to world, for whatever moves with the shoulders."""
+        place = self._place.copy()
+        away = np.append((self._shift(frame) - self._mean) * self._metres, 0)  # (3,)
+        place[:3, 3] += self._capture.cameras[0].camera_to_world[:3, :3] @ away
+        return place
 
     def _shift(self, frame: int) -> np.ndarray:
         """(2,) pixels by which the shoulders lie beside those of the first frame; 0 if unseen."""

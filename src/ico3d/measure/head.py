@@ -16,7 +16,6 @@ from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack, turn_values
 from ico3d.head.model_folder import TrainedHead
-from ico3d.head.neck import bent
 from ico3d.head.shoulders import shoulders_of
 from ico3d.head.views import (
     GREY,
@@ -35,7 +34,6 @@ from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.measure.sync.pipeline import sync_or_none
-from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 log = logging.getLogger(__name__)
@@ -60,16 +58,11 @@ class HeadRenderer:
             values = turn_values(self._head.turn, self._capture, [view.frame])  # (1, 3)
             expression = torch.cat([expression, values[0]])  # (B + 3,)
         with self.watch.picture():
-            gaussians = self._posed(self._head.model(expression), view.frame)
+            gaussians = self._head.model(expression)
+            if self._shoulders is not None:
+                gaussians = self._shoulders.posed(gaussians, view.frame)
             rendering = render(gaussians, [view.camera], behind.to(self._head.model.device))
         return rendering.rgb[0].clamp(0, 1).cpu().numpy()
-
-    def _posed(self, gaussians: Gaussians, frame: int) -> Gaussians:
-        """With the shoulders of a portrait where the recording has them."""
-        neck = self._head.model.shape.neck
-        if neck is None or self._shoulders is None:
-            return gaussians
-        return bent(gaussians, neck, self._shoulders.motion(frame))
 
 
 def evaluate_head(
