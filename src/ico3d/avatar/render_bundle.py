@@ -46,12 +46,17 @@ def swaying_head(bundle: Bundle, expression: np.ndarray, row: float) -> Gaussian
         BundleError: If the bundle has no head.
     """
     head, poses = bundle.require_head()
-    gaussians, pose = baked_gaussians(head, expression), pose_at(poses, row)
-    if (shoulders := bundle.shoulders) is not None:
-        motion = np.linalg.inv(pose) @ pose_at(shoulders.world_from_shoulders, row)
-        share = torch.from_numpy(shoulders.share / np.float32(255))  # (N,)
-        gaussians = bent(gaussians, share, torch.from_numpy(motion))
-    return gaussians.transform(pose)
+    pose = pose_at(poses, row)
+    return _bent(bundle, baked_gaussians(head, expression), pose, row).transform(pose)
+
+
+def _bent(bundle: Bundle, gaussians: Gaussians, pose: np.ndarray, row: float) -> Gaussians:
+    """A head's Gaussians in its space, with the shoulders where they are at a row of its poses."""
+    if (shoulders := bundle.shoulders) is None:
+        return gaussians
+    motion = np.linalg.inv(pose) @ pose_at(shoulders.world_from_shoulders, row)
+    share = torch.from_numpy(shoulders.share / np.float32(255))  # (N,)
+    return bent(gaussians, share, torch.from_numpy(motion))
 
 
 @dataclass(frozen=True)
@@ -221,7 +226,7 @@ def render_bundle(
     head, poses = bundle.require_head()
     pose = poses[0] if world_from_head is None else world_from_head
     behind = np.array(bundle.manifest.background) if background is None else background
-    gaussians = baked_gaussians(head, np.asarray(expression, np.float32))
+    gaussians = _bent(bundle, baked_gaussians(head, np.asarray(expression, np.float32)), pose, 0.0)
     with torch.no_grad():
         picture = render(gaussians, [camera.moved(pose)], torch.tensor(behind).float()).rgb[0]
     return picture.numpy()  # (H, W, 3)
