@@ -157,6 +157,7 @@ def test_a_making_is_begun_anew_or_discarded_and_a_finished_avatar_stays(people,
     places = Places(ada.folder)
     places.avatar.write_bytes(b"an earlier one")
     for act in (lambda: makers.begin(ada, "good", anew=True), lambda: makers.discard(ada)):
+        makers.stop(ada)
         makers.begin(ada, "good")
         _until(_began(ada).exists)
         makers.stop(ada)
