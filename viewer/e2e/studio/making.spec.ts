@@ -19,7 +19,7 @@ let page: Browser['page'];
 beforeAll(async () => {
   server = await ChatServer.studio(folder);
 });
-beforeEach(() => void runPython('references/recorded.py', folder, 'Ida', grey));
+beforeEach(() => void runPython('studio/recorded.py', folder, 'Ida', grey));
 afterEach(async () => {
   await browser.close();
   rmSync(person, { recursive: true, force: true });
@@ -39,7 +39,7 @@ async function open(width = 1280, height = 800): Promise<void> {
 /** How far the making is said to be; of a stopped one, of the recordings and the body as they are now. */
 function progress(state: string, more: Record<string, unknown> = {}): void {
   mkdirSync(join(person, 'making'), { recursive: true });
-  const parts = JSON.parse(runPython('references/signed.py', person)) as unknown[];
+  const parts = JSON.parse(runPython('studio/signed.py', person)) as unknown[];
   const known = { state, quality: 'quick', step: 'learn', share: 0.42, advice: [], made_of: { parts, on: [] } };
   writeFileSync(join(person, 'making', 'progress.json'), JSON.stringify({ ...known, ...more }));
 }
@@ -171,5 +171,5 @@ test('a tab on somebody who was deleted elsewhere says so by itself, and a new r
     'Ida was deleted elsewhere, in another tab or by hand: begin a new recording here.',
   );
   expect(await page.evaluate(() => document.activeElement?.id)).toBe('name');
-  expect(new URL(page.url()).hash).toBe('#');
+  expect(page.url()).not.toContain('Ida');
 }, 60_000);

@@ -35,5 +35,6 @@ export class Place {
 }
 
 function addressOf(values: URLSearchParams): string {
-  return `${location.pathname}${location.search}#${values}`;
+  const hash = values.size > 0 ? `#${values}` : '';
+  return location.pathname + location.search + hash;
 }
