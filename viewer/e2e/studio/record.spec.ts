@@ -43,10 +43,11 @@ const isSeen = (selector: string) =>
   });
 const filesOf = (id: string) => (existsSync(parts) ? readdirSync(parts).filter((name) => name.startsWith(`${id}.`)).toSorted() : []);
 
-/** Records the chosen part until the server has some of it. */
-async function record(): Promise<void> {
+/** Records the chosen part for some seconds: the server has some of it then. */
+async function record(seconds = 1): Promise<void> {
   await browser.page.click('#record');
-  await browser.page.waitForFunction(() => /[1-9] s/.test(document.querySelector('#clock')!.textContent!), undefined, PATIENCE);
+  const isLong = (least: number) => Number(/(\d+) s/.exec(document.querySelector('#clock')!.textContent!)?.[1] ?? 0) >= least;
+  await browser.page.waitForFunction(isLong, seconds, PATIENCE);
 }
 
 /** How full the meter of a row is: 0 for time, 1 for texts. */
@@ -95,7 +96,7 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   await page.click('#play');
   await page.waitForFunction(() => document.querySelector<HTMLVideoElement>('#replay')!.videoWidth > 0);
   await page.click('#close');
-  await record(); // a retake
+  await record(5); // a retake, long enough to pass for a whole video
   expect(statSync(join(parts, 'text-1.webm')).mtimeMs).toBe(first);
   await page.click('#record');
   await expect.poll(() => statSync(join(parts, 'text-1.webm')).mtimeMs, PATIENCE).toBeGreaterThan(first);
