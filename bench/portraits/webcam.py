@@ -1,6 +1,6 @@
 """What a webcam's faults cost a head, and whether it learns some people worse than others.
 
-    ICO3D_MODELS=MODELS python bench/webcam.py --work WORK [--seeds 3] [--json F]
+    ICO3D_MODELS=MODELS python bench/portraits/webcam.py --work WORK [--seeds 3] [--json F]
 
 Synthetic people talk before one camera. What a webcam with a fault makes of it, an H.264 film, goes
 the way of `ico3d create --quality quick`: MediaPipe tracks it, a head learns from it. The head is
