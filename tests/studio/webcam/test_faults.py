@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
+from ico3d.capture.portrait.exposure import displayed, linear
 from ico3d.studio.webcam.faults import (
     ELECTRONS,
     READ_NOISE,
     Shown,
-    displayed,
     dropping,
-    linear,
     noisy,
     random_of,
     rolled,
@@ -29,12 +28,6 @@ def _textured(shift: float) -> np.ndarray:
     y, x = np.mgrid[:64, :96].astype(float)
     waves = np.sin((x - shift) / 4.0) + np.sin((x - shift) / 9.0 + y / 6.0)
     return np.repeat((128 + 50 * waves).astype(np.uint8)[..., None], 3, 2)
-
-
-def test_display_values_come_back_from_linear_light():
-    values = np.linspace(0, 1, 256)
-    assert np.abs(displayed(linear(values)) - values).max() < 1e-6
-    assert displayed(np.array([2.0]))[0] == pytest.approx(1.0)  # clipped
 
 
 def test_noise_is_shot_and_read_noise():

@@ -35,17 +35,6 @@ def random_of(seed: int, fault: FaultName) -> np.random.Generator:
     return np.random.default_rng([seed, 2, FAULTS.index(fault)])
 
 
-def linear(values: np.ndarray) -> np.ndarray:
-    """Linear light of display values (sRGB), both in [0, 1] and of any shape."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-
-
-def displayed(light: np.ndarray) -> np.ndarray:
-    """Display values (sRGB) in [0, 1] of linear light of any shape; brighter light is clipped."""
-    light = np.clip(light, 0, 1)
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-
-
 def noisy(light: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Linear light (H, W, 3) with shot and read noise, which show most where it is dark."""
     sigma = np.sqrt(np.maximum(light, 0) / ELECTRONS + READ_NOISE**2)

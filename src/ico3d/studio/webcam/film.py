@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ico3d.capture.capture import Sound
+from ico3d.capture.portrait.exposure import displayed, linear
 from ico3d.common.files import write_atomic
 from ico3d.errors import MissingExtraError
 from ico3d.studio.webcam.faults import (
     FaultName,
     Shown,
-    displayed,
     dropping,
-    linear,
     noisy,
     random_of,
     rolled,
