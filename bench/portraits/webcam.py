@@ -27,6 +27,7 @@ from ico3d.cli import run_script
 from ico3d.common.psnr import psnr
 from ico3d.creating.settings import QUALITIES
 from ico3d.head.model_folder import TrainedHead
+from ico3d.head.settings import Initial
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import view_of
 from ico3d.measure.head import HeadRenderer
@@ -36,6 +37,8 @@ from ico3d.studio.webcam.faults import FAULTS, FaultName
 from ico3d.studio.webcam.film import webcam_of, write_film
 
 QUICK = QUALITIES["quick"]
+FIRST, MOST = 4_000, 6_000
+"""Gaussians that a training begins with, and has at most: half of what a head usually has."""
 WORKERS = 2
 
 
@@ -80,7 +83,7 @@ class Webcam:
     only: tuple[str, ...] = ()
     seconds: float = 20.0
     size: int = 320
-    steps: int = 400
+    steps: int = 250
     json: Path | None = None
 
     def run(self) -> None:
@@ -125,8 +128,10 @@ class Webcam:
         if not tracked.exists():
             track_portrait(film, tracked, PortraitSettings(refine=False, most=QUICK.pictures))
         capture = open_capture(tracked)
-        density = replace(QUICK.head.density, until=2 * self.steps // 3)
-        settings = replace(QUICK.head, steps=self.steps, density=density)
+        density = replace(QUICK.head.density, until=2 * self.steps // 3, max_gaussians=MOST)
+        settings = replace(
+            QUICK.head, steps=self.steps, density=density, initial=Initial(gaussians=FIRST)
+        )
         job = HeadJob("speech", "full", "builtin", seed, settings)
         return train_head(capture, folder / "head", job, device="cpu"), capture
 
