@@ -32,6 +32,7 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import view_of
 from ico3d.measure.head import HeadRenderer
 from ico3d.studio.layouts.portrait import parted
+from ico3d.studio.person.traits.names import TRAITS, TraitName
 from ico3d.studio.recording import Recording, record
 from ico3d.studio.webcam.faults import FAULTS, FaultName
 from ico3d.studio.webcam.film import webcam_of, write_film
@@ -39,6 +40,8 @@ from ico3d.studio.webcam.film import webcam_of, write_film
 QUICK = QUALITIES["quick"]
 FIRST, MOST = 4_000, 6_000
 """Gaussians that a training begins with, and has at most: half of what a head usually has."""
+PEOPLE_FPS = 12.5
+"""Pictures per second of films that compare people: half as many to draw."""
 WORKERS = 2
 
 
@@ -50,17 +53,23 @@ class Case:
         name: What the table calls it.
         faults: What the webcam does wrong.
         fps: Pictures per second.
+        traits: What the person has.
     """
 
     name: str
     faults: tuple[FaultName, ...] = ()
     fps: float = 25.0
+    traits: tuple[TraitName, ...] = ()
 
 
-CASES = (
+FILMS = (
     Case("clean"),
     *(Case(fault, (fault,)) for fault in FAULTS),
     Case("all faults", FAULTS),
+)
+PEOPLE = (
+    Case("plain", fps=PEOPLE_FPS),
+    *(Case(trait, fps=PEOPLE_FPS, traits=(trait,)) for trait in TRAITS),
 )
 
 
@@ -88,9 +97,13 @@ class Webcam:
 
     def run(self) -> None:
         """Records, tracks, trains, measures; prints the table."""
-        wanted = [case for case in CASES if not self.only or case.name in self.only]
+        wanted = [case for case in (*FILMS, *PEOPLE) if not self.only or case.name in self.only]
         rows = [self._row(case, seed) for seed in range(self.seeds) for case in wanted]
-        print(_table(rows))
+        for title, cases in (("film", FILMS), ("person", PEOPLE)):
+            names = {case.name for case in cases}
+            found = [row for row in rows if row["case"] in names]
+            if found:
+                print(_table(title, cases[0].name, found))
         if self.json:
             self.json.write_text(json.dumps(rows, indent=1) + "\n")
 
@@ -110,11 +123,12 @@ class Webcam:
 
     def _recorded(self, case: Case, seed: int) -> Capture:
         """The clean recording of a case, with the truth of everything."""
-        out = self.work / f"truth-{case.fps:g}-{seed}"
+        out = self.work / "-".join(["truth", f"{case.fps:g}", *case.traits, str(seed)])
         if not (out / "capture.json").is_file():
             frames = round(self.seconds * case.fps)
             of = ("anny", "bust", 1, frames, case.fps, 1, self.size, "", seed)
-            record(Recording(*of, False, "studio", "talk", gaze="visitor"), out, WORKERS)
+            how = Recording(*of, False, "studio", "talk", gaze="visitor", traits=case.traits)
+            record(how, out, WORKERS)
         return open_capture(out)
 
     def _learnt(
@@ -170,18 +184,18 @@ def _measured(head: TrainedHead, capture: Capture, case: Case, truth: Capture, s
     }
 
 
-def _table(rows: list[dict]) -> str:
-    """Means over the seeds, as Markdown."""
-    lines = ["| film | face, dB | head, dB | face less clean |", "|---|---|---|---|"]
+def _table(title: str, base: str, rows: list[dict]) -> str:
+    """Means over the seeds, as Markdown; differences are those from the case named `base`."""
+    lines = [f"| {title} | face, dB | head, dB | face against {base} |", "|---|---|---|---|"]
     names = dict.fromkeys(row["case"] for row in rows)
     means = {
         name: [np.mean([r[key] for r in rows if r["case"] == name]) for key in ("face", "head")]
         for name in names
     }
     for name, (face, whole) in means.items():
-        less = f"{face - means['clean'][0]:+.2f}" if "clean" in means else "–"
+        less = f"{face - means[base][0]:+.2f}" if base in means else "–"
         lines.append(f"| {name} | {face:.2f} | {whole:.2f} | {less} |")
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
 from ico3d.studio.dress.wearing import GARMENTS, dressed
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.subject import Subject
+from ico3d.studio.person.traits.names import TRAITS, TraitName
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.points import surface_points
 from ico3d.studio.rigs import BODY_DISTANCE, DISTANCE, RIGS, cameras_of
@@ -67,6 +68,7 @@ class Recording:
         near: How many of the cameras of a whole person show the upper body alone.
         faults: What a webcam in the place of the first camera does wrong, of `FAULTS`; its film is
             written beside the pictures, which stay as they are.
+        traits: What the person of a head's recording has, of `TRAITS`.
     """
 
     subject: str
@@ -87,6 +89,7 @@ class Recording:
     manner: str = "neutral"
     near: int = 0
     faults: tuple[FaultName, ...] = ()
+    traits: tuple[TraitName, ...] = ()
 
     @property
     def whole(self) -> bool:
@@ -113,7 +116,7 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         MissingExtraError: If an optional package is missing.
     """
     _check(recording)
-    subject = load_subject(recording.subject, recording.whole)
+    subject = load_subject(recording.subject, recording.whole, recording.traits)
     acted = perform(
         subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
@@ -179,6 +182,11 @@ def _check(recording: Recording) -> None:
         )
     if recording.faults:
         _check_faults(recording)
+    for name in recording.traits:
+        if name not in TRAITS:
+            raise SettingsError(f"there is no trait '{name}': use {' or '.join(TRAITS)}.")
+    if recording.traits and recording.whole:
+        raise SettingsError("traits are those of heads: use --rig head or --rig bust.")
 
 
 def _check_faults(recording: Recording) -> None:
