@@ -85,6 +85,8 @@ def test_loose_hair_falls_to_the_shoulders_and_not_into_the_face(plain):
     aside = np.abs(hair[:, 0]) < 0.7 * marks[16, 0]
     face = aside & (hair[:, 1] < 0.0) & (hair[:, 1] > marks[8, 1]) & (hair[:, 2] > 0.06)
     assert face.mean() < 0.001
+    throat = (np.abs(hair[:, 0]) < 0.035) & (hair[:, 2] > 0.0) & (hair[:, 1] < marks[8, 1])
+    assert throat.mean() < 0.001
 
 
 def test_dark_skin_is_dark(plain):

@@ -147,7 +147,7 @@ def loose(
     """
     count, s = len(roots), skull.scale
     start = unit(roots - skull.centre)
-    side = np.sign(start[:, 0] + 0.02 * random.standard_normal(count))
+    side = np.where(start[:, 0] + 0.02 * random.standard_normal(count) < 0, -1.0, 1.0)
     turn = np.abs(np.arctan2(start[:, 0], start[:, 2]))  # 0 in front, π behind
     aim = side * np.radians(82 + 98 * np.clip(turn / np.pi, 0, 1) ** 1.3)
     drop = np.radians(random.uniform(92, 102, count))  # from the crown, where the head ends
@@ -173,7 +173,8 @@ def loose(
     flare = unit(head[:, -1] * [1, 0, 1])
     hang += (0.012 * np.sin(np.pi * falls))[None, :, None] * flare[:, None]
     points = np.concatenate([head, hang], 1)  # (N, K + L, 3)
-    points = clumped(points, 0.35, 500, 0.55)
+    for one in (side > 0, side < 0):  # locks of one side have nothing of the other
+        points[one] = clumped(points[one], 0.35, 250, 0.55)
     points += 0.0016 * waves(count, LOOSE_POINTS, 1.0, random)
     points[:, over:] = _outside(points[:, over:], *below)
     along = np.linspace(0, 1, LOOSE_POINTS)
@@ -183,13 +184,19 @@ def loose(
 
 
 def _outside(points: np.ndarray, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Points (N, K, 3), pushed out of a surface where they lie in it or closer than `OFF` to it."""
+    """Points (N, K, 3), pushed out of a surface where they lie in it or closer than `OFF` to it.
+
+    What lies beside the nearest place of the surface rather than behind it is left where it is.
+    """
     flat = points.reshape(-1, 3).copy()
     tree = KDTree(places)
     for _ in range(3):
         nearest = tree.query(flat)[1]
-        height = ((flat - places[nearest]) * normals[nearest]).sum(1)
-        flat += np.maximum(OFF - height, 0)[:, None] * normals[nearest]
+        away, normal = flat - places[nearest], normals[nearest]
+        height = (away * normal).sum(1)
+        beside = np.linalg.norm(away - height[:, None] * normal, axis=1)
+        behind = beside < 0.008 + 0.5 * np.abs(height)
+        flat += (behind * np.maximum(OFF - height, 0))[:, None] * normal
     return flat.reshape(points.shape)
 
 
