@@ -61,16 +61,34 @@ class Video:
             CaptureError: If not a single picture can be decoded, or the video is longer than
                 `RECORDING`: two pictures far apart would be repeated for ever in between.
         """
+        for picture, _ in self.sampled(fps):
+            yield picture
+
+    def sampled(self, fps: float) -> Iterator[tuple[np.ndarray, bool]]:
+        """The pictures of `frames`, and whether each was taken at its moment.
+
+        It was where its own time is no farther than 0.5 / fps seconds away; in slower videos and in
+        gaps, pictures stand in for moments that have none.
+
+        Args:
+            fps: Pictures per second to yield.
+
+        Yields:
+            uint8 RGB (height, width, 3), contiguous, and True or False.
+
+        Raises:
+            CaptureError: As `frames`.
+        """
         count, before = 0, None
         for now in self._timed():
             while before is not None and count / fps < (before[0] + now[0]) / 2:
-                yield before[1]
+                yield before[1], _is_near(count / fps, before[0], fps)
                 count += 1
             before = now
         if before is None:
             raise CaptureError(f"{self.path}: no picture can be decoded; is the file damaged?")
         if count / fps <= before[0] + 0.5 / fps:
-            yield before[1]
+            yield before[1], _is_near(count / fps, before[0], fps)
 
     def _timed(self) -> Iterator[tuple[float, np.ndarray]]:
         """Every picture of the file with its seconds after the first one."""
@@ -98,6 +116,11 @@ class Video:
         scaled = frame.reformat(*size, format="rgb24", interpolation="AREA")
         # Rows are padded in the decoder's buffer; MediaPipe needs them without gaps.
         return np.ascontiguousarray(np.rot90(scaled.to_ndarray(), turns))
+
+
+def _is_near(wanted: float, taken: float, fps: float) -> bool:
+    """Whether a time is within half a step of another, in seconds; times in files are rounded."""
+    return abs(wanted - taken) <= 0.501 / fps
 
 
 def opened(path: Path) -> Any:

@@ -64,6 +64,13 @@ class Synthetic:
     manner: Literal["neutral", "friendly"] = "neutral"
     """How the face is all the time, whatever it says: as it is (`neutral`), or with a slight smile
     of mouth and eyes (`friendly`)."""
+    traits: tuple[Literal["glasses", "beard", "long-hair", "dark-skin", "child"], ...] = ()
+    """What the person has, for heads: glasses, a full beard, long loose hair, dark skin, or, with
+    the subject `anny`, a child's head."""
+    faults: tuple[Literal["noise", "exposure", "compression", "shutter", "drops"], ...] = ()
+    """Also write `webcam.mp4`: what a webcam in the place of the first camera makes of it, with
+    such faults. Noise that grows with darkness, exposure and white balance that wander, hasty
+    compression, rows that are read one after the other, 15 pictures per second for some seconds."""
     seed: int = 0
     """Seed of voice, order of sentences, blinks, brows, sway, gestures and choice of cameras."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -105,6 +112,8 @@ class Synthetic:
             self.gaze,
             self.manner,
             self.near_cameras,
+            self.faults,
+            self.traits,
         )
         record(recording, self.out, self.workers)
         say(f"{self.frames} frames by {self.cameras} cameras lie in {self.out}")

@@ -15,6 +15,7 @@ from PIL import Image
 from rich.progress import Progress, TextColumn
 from safetensors.numpy import save
 
+from ico3d.capture.capture import Sound
 from ico3d.capture.synthetic import FORMAT, VERSION
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
@@ -28,10 +29,13 @@ from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
 from ico3d.studio.dress.wearing import GARMENTS, dressed
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.subject import Subject
+from ico3d.studio.person.traits.names import TRAITS, TraitName
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.points import surface_points
 from ico3d.studio.rigs import BODY_DISTANCE, DISTANCE, RIGS, cameras_of
 from ico3d.studio.studio import CLOTHES, Studio, backdrop
+from ico3d.studio.webcam.faults import FAULTS, FaultName
+from ico3d.studio.webcam.film import write_film
 
 POINTS = 6000
 BODY_POINTS = 4000
@@ -62,6 +66,9 @@ class Recording:
         gaze: Where the person looks between glances, one of `GAZES`.
         manner: How the face is all the time, one of `MANNERS`.
         near: How many of the cameras of a whole person show the upper body alone.
+        faults: What a webcam in the place of the first camera does wrong, of `FAULTS`; its film is
+            written beside the pictures, which stay as they are.
+        traits: What the person of a head's recording has, of `TRAITS`.
     """
 
     subject: str
@@ -81,6 +88,8 @@ class Recording:
     gaze: str = "ahead"
     manner: str = "neutral"
     near: int = 0
+    faults: tuple[FaultName, ...] = ()
+    traits: tuple[TraitName, ...] = ()
 
     @property
     def whole(self) -> bool:
@@ -107,7 +116,7 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         MissingExtraError: If an optional package is missing.
     """
     _check(recording)
-    subject = load_subject(recording.subject, recording.whole)
+    subject = load_subject(recording.subject, recording.whole, recording.traits)
     acted = perform(
         subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
@@ -133,6 +142,8 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     _write_frames(out / "frames.safetensors", subject, acted, views, recording.seed)
     studio = Studio(subject, lamps, recording.clothes)
     _draw(studio, acted, cameras, backdrops, views, out, workers)
+    if recording.faults:
+        _film(recording, acted, out / "images" / cameras[0].name, out)
     # Last: a folder with capture.json is complete.
     _write_json(out / "capture.json", recording, subject, acted, cameras)
     (out / UNFINISHED).unlink()
@@ -169,6 +180,26 @@ def _check(recording: Recording) -> None:
             f"views_per_frame ({recording.views_per_frame}) cannot exceed "
             f"the number of cameras ({recording.cameras})."
         )
+    if recording.faults:
+        _check_faults(recording)
+    for name in recording.traits:
+        if name not in TRAITS:
+            raise SettingsError(f"there is no trait '{name}': use {' or '.join(TRAITS)}.")
+    if recording.traits and recording.whole:
+        raise SettingsError("traits are those of heads: use --rig head or --rig bust.")
+
+
+def _check_faults(recording: Recording) -> None:
+    for name in recording.faults:
+        if name not in FAULTS:
+            raise SettingsError(f"there is no fault '{name}': use {' or '.join(FAULTS)}.")
+    if recording.views_per_frame < recording.cameras:
+        raise SettingsError(
+            "a webcam takes every frame: with --faults, use --cameras 1, or --views-per-frame "
+            f"{recording.cameras}."
+        )
+    if recording.size % 2:
+        raise SettingsError(f"a film's size must be even, not {recording.size}: change --size.")
 
 
 def _begin(recording: Recording, out: Path) -> None:
@@ -235,6 +266,19 @@ def _draw(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def _film(recording: Recording, acted: Performance, pictures: Path, out: Path) -> None:
+    """Writes what a webcam in the place of a camera makes of its pictures, and what it did."""
+
+    def load(frame: int) -> np.ndarray:
+        with Image.open(pictures / _png_name(frame)) as picture:
+            return np.asarray(picture)
+
+    sound = Sound(acted.samples, SOUND_RATE)
+    of = (recording.frames, recording.fps, sound, recording.faults, recording.seed)
+    webcam = write_film(out / "webcam.mp4", load, *of)
+    write_atomic(out / "webcam.json", webcam.about(recording.fps))
 
 
 def _png_name(frame: int) -> str:

@@ -7,9 +7,10 @@ import numpy as np
 from ico3d.common.camera import Camera
 from ico3d.splat.cpu.compile import kernel
 from ico3d.studio.dress.tailoring import tailored
-from ico3d.studio.person.subject import CARDS, Subject
+from ico3d.studio.person.subject import CARDS, Material, Subject
 from ico3d.studio.picture.eyeball import eye_rows
 from ico3d.studio.picture.fibres import overlay, strand_colors
+from ico3d.studio.picture.glass import glaze
 from ico3d.studio.picture.lamps import Lamps
 from ico3d.studio.picture.lighting import Lights, lights_on
 from ico3d.studio.picture.materials import Colors
@@ -93,6 +94,8 @@ class Studio:
         self._lamps = lamps
         cards = np.isin(subject.materials, CARDS)
         self._solid = np.flatnonzero(~cards).astype(np.int32)
+        lenses = subject.materials == Material.LENS
+        self._lenses = np.flatnonzero(lenses).astype(np.int32)
         self._paint = paint(subject)
         self._tailored = tailored(subject)
         self._sky = None if subject.skeleton is None else Sky(subject, *BODY_MAP, BODY_DIRECTIONS)
@@ -167,6 +170,9 @@ class Studio:
                 local,
                 lights,
             )
+        if len(self._lenses):
+            factor = SUPERSAMPLING
+            glaze(out, nearest, factor, scene, self._lenses, screen, centre, lights)
         finished = developed(out)  # (H, W, 4)
         return finished[..., :3], finished[..., 3]
 

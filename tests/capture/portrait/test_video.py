@@ -53,6 +53,18 @@ def test_other_rates_are_resampled_by_time(tmp_path, fps, count):
     assert np.abs(given - nearest).max() <= step + 4
 
 
+def test_pictures_that_stand_in_for_others_are_told(tmp_path):
+    video = open_video(write_video(tmp_path / "v.mp4", list(range(20, 200, 6)), 15), 512)
+    told = list(video.sampled(25.0))
+    own = [picture.mean() for picture, own in told if own]
+    assert len(told) == pytest.approx(50, abs=1)
+    assert np.abs(np.array(own) - range(20, 200, 6)).max() < 4  # each of the 30 pictures once
+    whole = open_video(write_video(tmp_path / "w.mp4", [100] * 20, 25), 512)
+    assert all(own for _, own in whole.sampled(25.0))
+    fast = open_video(write_video(tmp_path / "f.mp4", [100] * 40, 50), 512)
+    assert all(own for _, own in fast.sampled(25.0))
+
+
 def test_large_videos_are_scaled_down_and_small_ones_are_not(tmp_path):
     path = write_video(tmp_path / "v.mp4", [100] * 3)
     assert next(open_video(path, 32).frames(25)).shape == (32, 48, 3)

@@ -70,9 +70,17 @@ def seeds(shape: tuple[int, ...], landmarks: np.ndarray) -> np.ndarray:
     neck = _trapezoid(chin, 0.25 * wide, chin[1] + 0.5 * tall, 0.6 * wide)
     cv2.fillPoly(labels, [neck], cv2.GC_FGD)
     _seed_chest(labels, chin, wide, tall)
-    oval = landmarks[FACE_OVAL].round().astype(np.int32)
-    cv2.fillPoly(labels, [oval], cv2.GC_FGD)
+    labels[inside_face(shape, landmarks)] = cv2.GC_FGD
     return labels
+
+
+def inside_face(shape: tuple[int, ...], landmarks: np.ndarray) -> np.ndarray:
+    """(h, w) bool: within the outline of a face with landmarks (478, 2) in pixels."""
+    import cv2
+
+    inside = np.zeros(shape[:2], np.uint8)
+    cv2.fillPoly(inside, [landmarks[FACE_OVAL].round().astype(np.int32)], 1)
+    return inside > 0
 
 
 def _seed_chest(labels: np.ndarray, chin: np.ndarray, wide: float, tall: float) -> None:

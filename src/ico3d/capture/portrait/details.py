@@ -44,6 +44,7 @@ def save_details(
         "fps": FPS,
         "num_frames": readings.total,
         "frames_without_face": readings.missing,
+        "frames_repeated": readings.repeated,
         "size": [video.width, video.height],
         "blendshape_names": list(readings.names),
         "tracker": {

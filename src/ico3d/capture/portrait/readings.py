@@ -15,6 +15,12 @@ from ico3d.capture.video import Video
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
+BLOCK, SAME = 8, 8.0
+"""Side of the parts of a picture that are compared, in every other of its pixels, and the mean
+difference, of 255, below which they are the same but for hasty compression."""
+MOST_REPEATED = 2
+"""Number of pictures in a row that are taken for repeated: who sits still for longer is seen."""
+
 
 @dataclass
 class Readings:
@@ -26,6 +32,7 @@ class Readings:
         poses: (4, 4) rough head pose for each frame with a face, see `Face.pose`.
         frames: Numbers of the frames with a face.
         missing: Numbers of the frames without a face.
+        repeated: Numbers of the frames that show a picture of another moment, and are not read.
         names: Names of the blendshapes.
         total: Number of all frames of the clip.
     """
@@ -35,6 +42,7 @@ class Readings:
     poses: list[np.ndarray] = field(default_factory=list)
     frames: list[int] = field(default_factory=list)
     missing: list[int] = field(default_factory=list)
+    repeated: list[int] = field(default_factory=list)
     names: tuple[str, ...] = ()
     total: int = 0
 
@@ -49,15 +57,25 @@ def read_faces(
 ) -> Readings:
     """Writes every picture and reads the face in it.
 
+    A moment of which the video has no picture of its own, because the camera was slow or the
+    picture before was recorded again, is left out: face and sound would not belong together.
+
     Raises:
         CaptureError: If there is no face in any of them.
     """
     readings = Readings()
     total = round(video.announced / video.rate * FPS) if video.announced * video.rate else None
     with FaceReader(model) as reader:
-        frames = tracked(video.frames(FPS), FACES, total, console, reached)
-        for number, image in enumerate(frames):
+        frames = tracked(video.sampled(FPS), FACES, total, console, reached)
+        before, in_a_row = None, 0
+        for number, (image, own) in enumerate(frames):
             readings.total = number + 1
+            again = own and before is not None and is_repeated(image, before)
+            if not own or (again and in_a_row < MOST_REPEATED):
+                in_a_row += again
+                readings.repeated.append(number)
+                continue
+            before, in_a_row = image, 0
             save_picture(work / "ori_imgs" / f"{number}.jpg", image)
             face = reader.read(image)
             if face is None:
@@ -75,6 +93,18 @@ def read_faces(
             "a portrait needs one person facing the camera."
         )
     return readings
+
+
+def is_repeated(image: np.ndarray, before: np.ndarray) -> bool:
+    """Whether a picture (H, W, 3) uint8 is the one before once more, but for its compression.
+
+    A single part of `BLOCK` pixels in which something moved tells that it is not.
+    """
+    height, width = (BLOCK * (side // 2 // BLOCK) for side in image.shape[:2])
+    pair = [picture[::2, ::2][:height, :width].astype(np.int16) for picture in (image, before)]
+    away = np.abs(pair[0] - pair[1]).mean(-1)  # (h, w)
+    parts = away.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK).mean((1, 3))
+    return bool(parts.max(initial=0) < SAME)
 
 
 def save_blendshapes(work: Path, readings: Readings) -> None:

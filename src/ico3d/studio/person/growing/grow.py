@@ -9,9 +9,12 @@ from ico3d.studio.person.growing import face, styles
 from ico3d.studio.person.growing.skull import Skull, skull_of
 from ico3d.studio.person.strands import Strands, bound, joined
 from ico3d.studio.person.subject import CARDS, Material, Subject
+from ico3d.studio.raster import vertex_normals
 
 LONG, SHORT = 14000, 28000
 """Strands on a head, of long and of short hair."""
+LOOSE = 20000
+"""Strands of long hair that falls on the shoulders."""
 TAIL = 3600
 """Strands in a tail."""
 RADIUS = 0.00013
@@ -35,17 +38,24 @@ FREE_TAIL = (
 the skin there, metres."""
 
 
-def with_hair(subject: Subject) -> Subject:
-    """The person with strands instead of the mesh that stood for hair; bald ones stay bald."""
+def with_hair(subject: Subject, loose: bool = False) -> Subject:
+    """The person with strands instead of the mesh that stood for hair; bald ones stay bald.
+
+    Args:
+        subject: The person.
+        loose: Whether the hair falls on the shoulders; else men's is cropped, women's tied.
+    """
     skull = skull_of(subject)
     if skull is None or not (subject.materials == Material.HAIR).any():
         return subject
     random = np.random.default_rng(7)
-    count = SHORT if subject.male else LONG
+    count = SHORT if subject.male and not loose else LOOSE if loose else LONG
     corners, parts = _roots(subject, skull, count, random)
     roots = np.einsum("nk,nkc->nc", parts, subject.vertices[corners])
     grown = []
-    if not subject.male:
+    if loose:
+        paths = styles.loose(skull, roots, _skin_and_cloth(subject), random)
+    elif not subject.male:
         line, width = _tail_line(subject, skull)
         paths = styles.tied(skull, roots, line[0], random)
         hanging = styles.tail(line, width, TAIL, random)
@@ -69,6 +79,13 @@ def with_hair(subject: Subject) -> Subject:
         corner_uv=subject.corner_uv[bare],
         strands=joined(grown),
     )
+
+
+def _skin_and_cloth(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
+    """Places (N, 3) and normals (N, 3) of what hair lies on."""
+    worn = np.isin(subject.materials, (Material.SKIN, Material.CLOTH))
+    on = np.unique(subject.faces[worn])
+    return subject.vertices[on], vertex_normals(subject.vertices, subject.faces)[on]
 
 
 def _of(

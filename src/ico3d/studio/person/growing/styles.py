@@ -9,6 +9,10 @@ from ico3d.studio.person.growing.skull import Skull
 
 POINTS, SHORT_POINTS = 18, 8
 """Points of a strand of long and of short hair."""
+LOOSE_POINTS, LOOSE_LENGTH = 26, 0.27
+"""Points of a strand of loose hair, and how far it hangs below the head, metres."""
+OFF = 0.006
+"""Least distance of loose hair from skin and clothes, metres."""
 CROWN = np.array([0.0, 0.85, -0.5]) / np.hypot(0.85, 0.5)
 
 
@@ -125,6 +129,75 @@ def tail(line: np.ndarray, width: np.ndarray, count: int, random: np.random.Gene
     depth = np.broadcast_to(((1 - radius) ** 0.8)[:, None], t.shape)
     taper = np.broadcast_to(1 - 0.75 * np.linspace(0, 1, points_each) ** 3, t.shape)
     return Paths(points, depth, taper)
+
+
+def loose(
+    skull: Skull,
+    roots: np.ndarray,
+    below: tuple[np.ndarray, np.ndarray],
+    random: np.random.Generator,
+) -> Paths:
+    """Long hair, parted in the middle, that falls beside the face and behind the shoulders.
+
+    Args:
+        skull: The head.
+        roots: (N, 3) places of the roots, metres.
+        below: Places (M, 3) and normals (M, 3) of skin and clothes, on which it lies.
+        random: Source of all random choices.
+    """
+    count, s = len(roots), skull.scale
+    start = unit(roots - skull.centre)
+    side = np.where(start[:, 0] + 0.02 * random.standard_normal(count) < 0, -1.0, 1.0)
+    turn = np.abs(np.arctan2(start[:, 0], start[:, 2]))  # 0 in front, π behind
+    aim = side * np.radians(82 + 98 * np.clip(turn / np.pi, 0, 1) ** 1.3)
+    drop = np.radians(random.uniform(92, 102, count))  # from the crown, where the head ends
+    end = np.stack(
+        [np.sin(drop) * np.sin(aim), np.cos(drop), np.sin(drop) * np.cos(aim)], 1
+    )  # (N, 3)
+    over = LOOSE_POINTS // 2
+    t = np.linspace(0, 1, over)
+    angle = np.arccos(np.clip((start * end).sum(1), -1, 1))[:, None]  # (N, 1)
+    sine = np.maximum(np.sin(angle), 1e-3)
+    one, two = np.sin((1 - t) * angle) / sine, np.sin(t * angle) / sine  # (N, K)
+    path = one[..., None] * start[:, None] + two[..., None] * end[:, None]
+    bow = 0.35 * np.sin(np.pi * t) * smooth(-0.2, 0.7, start[:, 2])[:, None]
+    path = unit(path + bow[..., None] * np.array([0.0, 0.6, 0.0]))
+    level = random.random(count) ** 0.6  # 1: on the surface
+    rise = 1 - np.exp(-6 * t)
+    full = s * (0.004 + 0.010 * smooth(0.1, 0.9, t))
+    head = skull.on(path, 0.0006 + rise * full * (0.2 + 0.8 * level[:, None]))
+    falls = np.linspace(0, 1, LOOSE_POINTS - over + 1)[1:]  # (L,)
+    long = s * LOOSE_LENGTH * random.uniform(0.8, 1.05, count)
+    hang = np.repeat(head[:, -1:], len(falls), 1)
+    hang[..., 1] -= long[:, None] * falls
+    flare = unit(head[:, -1] * [1, 0, 1])
+    hang += (0.012 * np.sin(np.pi * falls))[None, :, None] * flare[:, None]
+    points = np.concatenate([head, hang], 1)  # (N, K + L, 3)
+    for one in (side > 0, side < 0):  # locks of one side have nothing of the other
+        points[one] = clumped(points[one], 0.35, 250, 0.55)
+    points += 0.0016 * waves(count, LOOSE_POINTS, 1.0, random)
+    points[:, over:] = _outside(points[:, over:], *below)
+    along = np.linspace(0, 1, LOOSE_POINTS)
+    depth = (1 - level)[:, None] * np.minimum(1, 4 * along)
+    taper = np.broadcast_to(1 - 0.6 * along**4, depth.shape)
+    return Paths(points, depth, taper)
+
+
+def _outside(points: np.ndarray, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Points (N, K, 3), pushed out of a surface where they lie in it or closer than `OFF` to it.
+
+    What lies beside the nearest place of the surface rather than behind it is left where it is.
+    """
+    flat = points.reshape(-1, 3).copy()
+    tree = KDTree(places)
+    for _ in range(3):
+        nearest = tree.query(flat)[1]
+        away, normal = flat - places[nearest], normals[nearest]
+        height = (away * normal).sum(1)
+        beside = np.linalg.norm(away - height[:, None] * normal, axis=1)
+        behind = beside < 0.008 + 0.5 * np.abs(height)
+        flat += (behind * np.maximum(OFF - height, 0))[:, None] * normal
+    return flat.reshape(points.shape)
 
 
 def short(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Paths:

@@ -1,0 +1,1 @@
+"""What a webcam does wrong when it records a synthetic person."""
