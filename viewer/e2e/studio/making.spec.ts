@@ -4,6 +4,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, expect, inject, test } from
 import { judge } from '../../support/browser/axe.ts';
 import { Browser } from '../../support/browser/browser.ts';
 import { runPython } from '../../support/python.ts';
+import { hasTracker, MODELS } from '../../support/references/portrait.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { ChatServer } from '../../support/servers/server.ts';
 
@@ -17,7 +18,7 @@ let browser: Browser;
 let page: Browser['page'];
 
 beforeAll(async () => {
-  server = await ChatServer.studio(folder);
+  server = await ChatServer.tracking(folder, MODELS);
 });
 beforeEach(() => void runPython('studio/recorded.py', folder, 'Ida', grey));
 afterEach(async () => {
@@ -120,7 +121,7 @@ test('with other recordings nothing goes on, and that is said', async () => {
   expect(await page.textContent('#choices')).toMatch(/^The recordings have changed since, so it starts over/);
 }, 60_000);
 
-test.skipIf(!demo)('recordings without a face are refused in the language of the page, and stay', async () => {
+test.skipIf(!hasTracker)('recordings without a face are refused in the language of the page, and stay', async () => {
   await open();
   await page.selectOption('#language', 'de');
   await page.selectOption('#quality', 'quick');
@@ -132,7 +133,7 @@ test.skipIf(!demo)('recordings without a face are refused in the language of the
   expect(readdirSync(join(person, 'parts'))).toContain('text-1.mp4');
 }, 200_000);
 
-test.skipIf(!demo)('a video without a face is not kept, and the page says what create says', async () => {
+test.skipIf(!hasTracker)('a video without a face is not kept, and the page says what create says', async () => {
   await open(390, 844);
   await page.selectOption('#language', 'fr');
   await page.setInputFiles('#file', grey);

@@ -5,6 +5,12 @@ import { ENVIRONMENT, PYTHON, REPOSITORY, runPython } from '../python.ts';
 
 const SHARED = join(REPOSITORY, '../shared');
 const CLIP = join(SHARED, 'clips/portrait_a.mp4');
+
+/** Where models that are no part of the repository may be. */
+export const MODELS = join(SHARED, 'models');
+
+/** Whether faces can be tracked. */
+export const hasTracker = existsSync(join(MODELS, 'face_landmarker.task'));
 const PERSONA = join(REPOSITORY, 'viewer/support/references/persona.json');
 
 /** Whether there is a real recording to make an avatar of. */
@@ -34,7 +40,7 @@ export function makeStandIn(folder: string, demo: string | null): string {
 
 function ico3d(...words: string[]): void {
   const began = Date.now();
-  const env = { ...ENVIRONMENT, ICO3D_MODELS: join(SHARED, 'models') };
+  const env = { ...ENVIRONMENT, ICO3D_MODELS: MODELS };
   const done = spawnSync(PYTHON, ['-m', 'ico3d.cli', ...words], { cwd: REPOSITORY, env, encoding: 'utf8' });
   if (done.status !== 0) throw new Error(`ico3d ${words.join(' ')}: ${done.stdout}${done.stderr}`);
   console.log(`ico3d ${words[0]} took ${((Date.now() - began) / 1000).toFixed(1)} s`);

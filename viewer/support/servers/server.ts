@@ -24,14 +24,19 @@ export class ChatServer {
     return ChatServer.run(['studio', folder, '--port', String(port), '--no-browser', ...more]);
   }
 
+  /** `ico3d studio` with a folder, which tracks faces by the models in another one. */
+  static tracking(folder: string, models: string): Promise<ChatServer> {
+    return ChatServer.run(['studio', folder, '--port', '0', '--no-browser'], [], { ...ENVIRONMENT, ICO3D_MODELS: models });
+  }
+
   /** `ico3d studio` with a folder, whose files the system lets grow to so many bytes, as on a full disk. */
   static limited(folder: string, bytes: number): Promise<ChatServer> {
     return ChatServer.run(['studio', folder, '--port', '0', '--no-browser'], ['prlimit', `--fsize=${bytes}`]);
   }
 
-  private static async run(words: string[], before: string[] = []): Promise<ChatServer> {
+  private static async run(words: string[], before: string[] = [], env: NodeJS.ProcessEnv = ENVIRONMENT): Promise<ChatServer> {
     const [program, ...args] = [...before, PYTHON, '-m', 'ico3d.cli', ...words];
-    const child = spawn(program!, args, { cwd: REPOSITORY, env: ENVIRONMENT, stdio: ['ignore', 'pipe', 'inherit'] });
+    const child = spawn(program!, args, { cwd: REPOSITORY, env, stdio: ['ignore', 'pipe', 'inherit'] });
     return new ChatServer(child, await readUrl(child));
   }
 
