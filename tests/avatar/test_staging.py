@@ -11,7 +11,7 @@ from ico3d.bundle.manifest import CameraInfo
 def test_motion_turns_around_where_the_head_is_slow(blendshape_head):
     """10 s at 3 frames/s are 30 frames: from one still moment (20) to the other (50)."""
     _, capture = blendshape_head
-    poses = staging.idle_motion(capture)
+    poses = staging.idle_motion(capture).poses
     assert poses.shape == (30, 4, 4)
     first = np.arcsin(poses[0, 0, 2])
     expected = [np.arcsin(capture.world_from_head(f)[0, 2]) for f in range(capture.num_frames)]
@@ -23,7 +23,7 @@ def test_motion_is_rigid_and_skips_lost_frames(blendshape_head):
     found = type(capture).world_from_head
     lost = {10: None, 40: np.full((4, 4), np.nan)}
     capture.world_from_head = lambda frame: lost.get(frame, found(capture, frame))
-    poses = staging.idle_motion(capture)
+    poses = staging.idle_motion(capture).poses
     assert len(poses) == 29  # frames 11 to 39
     gram = poses[:, :3, :3] @ poses[:, :3, :3].transpose(0, 2, 1)
     np.testing.assert_allclose(gram, np.tile(np.eye(3), (29, 1, 1)), atol=1e-12)
@@ -33,7 +33,7 @@ def test_motion_is_rigid_and_skips_lost_frames(blendshape_head):
 def test_without_poses_the_head_rests(blendshape_head):
     _, capture = blendshape_head
     capture.world_from_head = lambda frame: None
-    np.testing.assert_array_equal(staging.idle_motion(capture), np.eye(4)[None])
+    np.testing.assert_array_equal(staging.idle_motion(capture).poses, np.eye(4)[None])
 
 
 def test_jitter_is_smoothed(blendshape_head):
@@ -47,7 +47,7 @@ def test_jitter_is_smoothed(blendshape_head):
         return pose
 
     capture.world_from_head = shaken
-    assert staging.idle_motion(capture)[:, :3, 3].std() < 0.6 * jitter.std()
+    assert staging.idle_motion(capture).poses[:, :3, 3].std() < 0.6 * jitter.std()
 
 
 def test_the_frontal_camera_sees_a_symmetric_face(blendshape_head):

@@ -10,8 +10,10 @@ from ico3d.cli import main
 from ico3d.errors import MissingModelError
 from ico3d.recording import app as server
 from ico3d.recording.guiding import seeing
+from ico3d.recording.keeping.body_choice import HEAD_ALONE
 from ico3d.recording.keeping.person import Person
 from ico3d.recording.keeping.plan import scripts
+from ico3d.recording.making.makers import Bodies
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE, Progress, write_progress
 from support.needs import needs
@@ -134,6 +136,65 @@ def test_a_file_that_is_no_video_is_gone_and_nothing_else(page, room, video):
     parts = room.people.folder / "Ida" / "parts"
     names = {file.name for file in parts.iterdir() if not file.name.startswith("consent")}
     assert names == {"text-1.json", "text-1.mp4"}
+
+
+def test_a_video_of_which_nothing_can_be_made_is_gone_and_an_earlier_one_stays(
+    page, room, video, tmp_path
+):
+    assert _send(page, "upload", video).status_code == 200
+    mute = part_file(tmp_path / "mute.mp4", 10, sound=False).read_bytes()
+    answer = _send(page, "upload", mute, take="b2")
+    told = answer.json()
+    assert (answer.status_code, told["code"]) == (422, "unusable")
+    assert told["error"].startswith("the video has no sound")
+    (advice,) = told["advice"]
+    assert (advice["code"], advice["level"]) == ("sound-none", "refused")
+    parts = room.people.folder / "Ida" / "parts"
+    assert sorted(file.name for file in parts.glob("upload.*")) == ["upload.json", "upload.mp4"]
+    assert (parts / "upload.mp4").read_bytes() == video
+
+
+def test_a_body_is_chosen_and_kept_with_the_recording(page, room):
+    shown = page.get("/recordings/").json()
+    assert shown["builds"] == ["slender", "medium", "sturdy"]
+    assert (shown["outfits"], shown["packaged"]) == (["recorded", "navy", "wine"], True)
+    alone = {"wanted": False, "build": "medium", "outfit": "recorded"}
+    assert page.get("/recordings/Ida").json()["body"] == alone
+    choice = {"wanted": True, "build": "slender", "outfit": "wine"}
+    assert page.put("/recordings/Ida/body", json=choice).json()["body"] == choice
+    assert _client(room).get("/recordings/Ida").json()["body"] == choice  # after a restart, too
+    for wrong in ({}, choice | {"build": "huge"}, choice | {"wanted": 1}, choice | {"outfit": []}):
+        answer = page.put("/recordings/Ida/body", json=wrong)
+        assert (answer.status_code, answer.json()["code"]) == (400, "body")
+    assert page.get("/recordings/Ida").json()["body"] == choice
+    (room.people.folder / "Ida" / "body.json").write_text("[]")
+    assert page.get("/recordings/Ida").json()["body"] == alone
+    assert page.put("/recordings/Eve/body", json=choice).json()["code"] == "unknown"
+
+
+def test_a_body_that_cannot_look_so_is_refused_before_the_making(tmp_path, monkeypatch):
+    monkeypatch.setattr(seeing, "model_file", _lacking)
+    missing = Bodies(tmp_path / "nobody.ico3d", HEAD_ALONE)
+    room = server.open_room(tmp_path / "recordings", "127.0.0.1", False, missing)
+    client = _client(room)
+    client.post("/recordings/Ida", json={"agreed": True, "language": "de"})
+    assert client.get("/recordings/").json()["packaged"] is False
+    choice = {"wanted": True, "build": "slender", "outfit": "wine"}
+    answer = client.put("/recordings/Ida/body", json=choice)
+    assert answer.status_code == 500 and "nobody.ico3d" in answer.json()["error"]
+    assert client.put("/recordings/Ida/body", json=choice | {"wanted": False}).status_code == 200
+
+
+def test_what_was_made_so_far_is_discarded_and_the_recordings_stay(page, room, video):
+    _send(page, "text-1", video)
+    folder = Places(room.people.folder / "Ida").folder
+    folder.mkdir()
+    write_progress(folder, Progress("stopped", "quick", "learn", 0.4))
+    made = page.get("/recordings/Ida").json()["making"]
+    assert (made["state"], made["changed"]) == ("stopped", ["parts", "on"])
+    assert "made_of" not in made
+    gone = page.delete("/recordings/Ida/making", params={"discard": True}).json()
+    assert gone["making"] is None and _state(gone, "text-1") == "kept" and not folder.exists()
 
 
 def test_a_form_nested_deep_is_none(page):

@@ -7,7 +7,7 @@ import { servePage } from '../support/servers/static.ts';
 
 const WIDTH = 320;
 const HEIGHT = 240;
-const reference = makeReference({ gaussians: 4000, pictures: `${WIDTH}x${HEIGHT}` });
+const reference = makeReference({ gaussians: 4000, pictures: `${WIDTH}x${HEIGHT}`, shoulders: true });
 const pixels = 3 * WIDTH * HEIGHT;
 const values = reference.attributes.length / reference.expressions.length;
 

@@ -15,6 +15,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
+from ico3d.head.neck import bent
 from ico3d.splat import harmonics
 from ico3d.splat.files.formats import read_gaussians
 from ico3d.splat.gaussians import Gaussians, cat
@@ -31,6 +32,31 @@ def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
         opacities=torch.from_numpy(opacity),
         colors=torch.from_numpy(rgb),
     )
+
+
+def swaying_head(bundle: Bundle, expression: np.ndarray, row: float) -> Gaussians:
+    """The head of a bundle without a body, in the world.
+
+    Args:
+        bundle: A bundle of a head alone.
+        expression: (B,).
+        row: At which of the head's poses, or between which.
+
+    Raises:
+        BundleError: If the bundle has no head.
+    """
+    head, poses = bundle.require_head()
+    pose = pose_at(poses, row)
+    return _bent(bundle, baked_gaussians(head, expression), pose, row).transform(pose)
+
+
+def _bent(bundle: Bundle, gaussians: Gaussians, pose: np.ndarray, row: float) -> Gaussians:
+    """A head's Gaussians in its space, with the shoulders where they are at a row of its poses."""
+    if (shoulders := bundle.shoulders) is None:
+        return gaussians
+    motion = np.linalg.inv(pose) @ pose_at(shoulders.world_from_shoulders, row)
+    share = torch.from_numpy(shoulders.share / np.float32(255))  # (N,)
+    return bent(gaussians, share, torch.from_numpy(motion))
 
 
 @dataclass(frozen=True)
@@ -200,7 +226,7 @@ def render_bundle(
     head, poses = bundle.require_head()
     pose = poses[0] if world_from_head is None else world_from_head
     behind = np.array(bundle.manifest.background) if background is None else background
-    gaussians = baked_gaussians(head, np.asarray(expression, np.float32))
+    gaussians = _bent(bundle, baked_gaussians(head, np.asarray(expression, np.float32)), pose, 0.0)
     with torch.no_grad():
         picture = render(gaussians, [camera.moved(pose)], torch.tensor(behind).float()).rgb[0]
     return picture.numpy()  # (H, W, 3)

@@ -1,6 +1,7 @@
 """How a baked avatar is presented: idle motion, the visitor's camera, background, thumbnail."""
 
 import io
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -33,23 +34,35 @@ NEUTRAL = (0.84, 0.86, 0.88)
 """Background colour, a light grey, where the capture has no clean background."""
 
 
-def idle_motion(capture: Capture) -> np.ndarray:
+@dataclass(frozen=True)
+class IdleMotion:
+    """How a head alone sways.
+
+    Attributes:
+        poses: (F, 4, 4) float64 smoothed head poses at the capture's rate.
+        first: The frame of the first pose.
+    """
+
+    poses: np.ndarray
+    first: int
+
+
+def idle_motion(capture: Capture) -> IdleMotion:
     """The span of head poses that looks best when it is played back and forth.
 
     Playback turns around at both ends, so the head should be slow there, and smooth in between.
 
     Returns:
-        (F, 4, 4) float64 smoothed head poses at the capture's rate, 10 s at most; (1, 4, 4), the
-        identity, where there are no poses.
+        10 s at most; a single pose, the identity, where there are no poses.
     """
-    poses = _longest_run([capture.world_from_head(f) for f in range(capture.num_frames)])
+    poses, first = _longest_run([capture.world_from_head(f) for f in range(capture.num_frames)])
     if len(poses) == 0:
-        return np.eye(4)[None]
-    poses = _smoothed(poses)
+        return IdleMotion(np.eye(4)[None], 0)
+    poses = smoothed(poses)
     length = min(len(poses), max(1, int(LONGEST * capture.fps)))
     starts = range(len(poses) - length + 1)
     best = min(starts, key=lambda start: _roughness(poses[start : start + length]))
-    return poses[best : best + length]
+    return IdleMotion(poses[best : best + length], first + best)
 
 
 def frontal_camera(capture: Capture) -> int:
@@ -127,18 +140,19 @@ def triple(values: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _longest_run(poses: list[np.ndarray | None]) -> np.ndarray:
-    """(F, 4, 4) poses of the longest run of consecutive frames that all have a finite pose."""
-    runs: list[list[np.ndarray]] = [[]]
-    for pose in poses:
+def _longest_run(poses: list[np.ndarray | None]) -> tuple[np.ndarray, int]:
+    """Poses (F, 4, 4) of the longest run of frames that all have a finite one, and its first."""
+    runs: list[tuple[list[np.ndarray], int]] = [([], 0)]
+    for frame, pose in enumerate(poses):
         if pose is not None and np.isfinite(pose).all():
-            runs[-1].append(pose)
+            runs[-1][0].append(pose)
         else:
-            runs.append([])
-    return np.array(max(runs, key=len), np.float64).reshape(-1, 4, 4)
+            runs.append(([], frame + 1))
+    longest, first = max(runs, key=lambda run: len(run[0]))
+    return np.array(longest, np.float64).reshape(-1, 4, 4), first
 
 
-def _smoothed(poses: np.ndarray) -> np.ndarray:
+def smoothed(poses: np.ndarray) -> np.ndarray:
     """Gaussian smoothing over time; rotations are averaged as matrices and made rigid again."""
     reach = int(3 * _SMOOTHING)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / _SMOOTHING) ** 2)

@@ -19,6 +19,7 @@ from ico3d.bundle.onnx_check import check_onnx
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.provenance import ClonedVoice
 from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
+from ico3d.bundle.shoulders import SHOULDERS, BakedShoulders
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
@@ -41,6 +42,8 @@ class Bundle:
         head: The baked head, or None for a body alone.
         world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: on a body one for each
             frame of the body; without a body to be played back and forth; None without a head.
+        shoulders: How the shoulders of a head alone stand while it sways; None where all follows
+            the head.
         skinned: The body on a skeleton, or None.
         gestures: Gestures of the body on a skeleton besides the recorded motion, by name, or None.
         cuts: Frames of the recording that are gestures; empty where nobody says which.
@@ -52,6 +55,7 @@ class Bundle:
     manifest: Manifest
     head: BakedHead | None
     world_from_head: np.ndarray | None
+    shoulders: BakedShoulders | None
     skinned: BakedSkinned | None
     gestures: dict[str, Clip] | None
     cuts: tuple[Cut, ...]
@@ -134,11 +138,13 @@ class Bundle:
 
     def _check_contents(self) -> None:
         info = self.manifest.head
-        self.head = self.world_from_head = None
+        self.head = self.world_from_head = self.shoulders = None
         if info is not None:
             rest = self.read(HEAD_REST) if info.num_rest else b""
             self.head = BakedHead.from_bytes(self.read(HEAD), info, rest)
             self.world_from_head = poses_from_bytes(self.read(POSES), info.num_poses)
+            if SHOULDERS in self.manifest.files:
+                self.shoulders = BakedShoulders.from_bytes(self.read(SHOULDERS), info)
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
         self.skinned = self.gestures = self.animation = None
@@ -312,6 +318,8 @@ def _check_required(manifest: Manifest) -> None:
     for name in sorted(required - set(manifest.files)):
         raise BundleError(f"{name}: is missing.")
     possible = {LICENSES, *BACKGROUNDS, *([GESTURES] if manifest.skinned else [])}
+    if manifest.head and not manifest.any_body:
+        possible |= {SHOULDERS}
     for name in manifest.files:
         if name not in required | possible:
             raise BundleError(f"{name[:80]}: does not belong into this bundle.")

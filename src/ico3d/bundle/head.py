@@ -143,7 +143,7 @@ def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
     """
     spec = _poses_spec(len(world_from_head))
     poses = np.asarray(world_from_head, np.float32)
-    _check_rigid(poses)
+    check_rigid(poses, POSES)
     return encode_tensors({"world_from_head": poses}, spec, POSES)
 
 
@@ -154,7 +154,7 @@ def poses_from_bytes(data: bytes, num_poses: int) -> np.ndarray:
         BundleError: If the file is malformed or a pose is not rigid.
     """
     poses = decode_tensors(data, _poses_spec(num_poses), POSES)["world_from_head"]
-    _check_rigid(poses)
+    check_rigid(poses, POSES)
     return poses
 
 
@@ -187,7 +187,12 @@ def _check_values(head: BakedHead) -> None:
         raise BundleError(f"{HEAD}: 'quats' are not normalised.")
 
 
-def _check_rigid(poses: np.ndarray) -> None:
+def check_rigid(poses: np.ndarray, file: str) -> None:
+    """Checks transforms (F, 4, 4) of a file.
+
+    Raises:
+        BundleError: If one of them is not rigid.
+    """
     rotations = poses[:, :3, :3].astype(np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         gram = rotations @ rotations.transpose(0, 2, 1)  # (F, 3, 3)
@@ -196,4 +201,4 @@ def _check_rigid(poses: np.ndarray) -> None:
         rigid = (off < 1e-3) & (last < 1e-6) & (np.linalg.det(rotations) > 0)
     rigid &= np.abs(poses[:, :3, 3]).max(axis=1) < _MAX_LENGTH
     if not rigid.all():
-        raise BundleError(f"{POSES}: pose {int(np.argmin(rigid))} is not a rigid transform.")
+        raise BundleError(f"{file}: pose {int(np.argmin(rigid))} is not a rigid transform.")

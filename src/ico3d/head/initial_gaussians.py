@@ -16,6 +16,7 @@ from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape, Variant
 from ico3d.head.settings import HeadSettings
+from ico3d.head.shoulders import neck_of
 from ico3d.head.views import view_of
 from ico3d.splat.initial import in_pictures, resampled, spacing
 
@@ -75,6 +76,7 @@ def initial_head(
         box_size=float((high - low).max() / 2),
         sh_degree=settings.sh_degree,
         turns=settings.turns and variant in ("full", "no-mlp") and capture.shows == "head",
+        neck=neck_of(capture),
     )
     model = HeadModel(shape, len(points))
     model.means.data = torch.from_numpy(points).float()

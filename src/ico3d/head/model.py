@@ -13,6 +13,7 @@ from ico3d.common.expression import TURN_SIZE
 from ico3d.errors import ModelError
 from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
+from ico3d.head.neck import Neck
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
@@ -45,6 +46,7 @@ class HeadShape:
         turns: Whether the basis has rows for the head's rotation, too, by which its shading
             follows lamps that stand still (`TurnRange`).
         relit: Whether each Gaussian has a change of light (`HeadModel.relit`).
+        neck: Where a portrait's neck bends; None where all Gaussians follow the head.
     """
 
     expression_size: int
@@ -58,6 +60,7 @@ class HeadShape:
     sh_degree: int = 0
     turns: bool = False
     relit: bool = False
+    neck: Neck | None = None
 
     @property
     def outputs(self) -> int:
@@ -274,6 +277,10 @@ class HeadModel(nn.Module):
         try:
             fields = dict(state["shape"])
             fields["box_center"] = tuple(fields["box_center"])
+            if fields.get("neck") is not None:
+                fields["neck"] = Neck(
+                    **fields["neck"] | {"middle": tuple(fields["neck"]["middle"])}
+                )
             model = cls(HeadShape(**fields), tensors["means"].shape[0])
             model.load_state_dict(tensors)
         except DAMAGED as error:

@@ -13,16 +13,12 @@ from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.blending.basis import blend_of, update_basis
 from ico3d.head.closeups import CloseUp, CloseUps
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
-from ico3d.head.expressions import (
-    ExpressionTrack,
-    evening_rates,
-    is_of_eyes,
-    turn_of,
-    turn_values,
-)
+from ico3d.head.expressions import ExpressionTrack, turn_of, turn_values
+from ico3d.head.learning_rows import LearningRows
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import SGD_GAINS, HeadSettings
+from ico3d.head.shoulders import shoulders_of
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
@@ -91,8 +87,8 @@ class HeadTrainer:
         frames = sorted({view.frame for view in self.views})
         self.turn = turn_of(capture, frames) if model.shape.turns else None
         self._turns = self._turn_values(frames)
-        self._evening = self._row_factors(frames).to(model.device)  # (R,)
-        self._eyes = self._eye_rows()  # (R,)
+        self._rows = LearningRows(model.shape, track, frames, settings.even_rows)
+        self._shoulders = shoulders_of(capture, model.shape.neck, self.pictures)
         self._close_ups = CloseUps(capture, self.views if settings.close_ups else [], seed)
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
@@ -129,7 +125,7 @@ class HeadTrainer:
         expression = self.expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
-        gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
+        gaussians = self.posed(gaussians.up_to_degree(index // self._settings.sh_every), view)
         absgrad = self._settings.density.absgrad
         rendering = render(gaussians, [view.camera], background, absgrad=absgrad)
         loss = self._loss(rendering, target, picture, index)
@@ -150,6 +146,11 @@ class HeadTrainer:
         if self.turn is not None:
             expression = torch.cat([expression, self._turns[view.frame]])  # (B + 3,)
         return expression.to(self.model.device)
+
+    def posed(self, gaussians: Gaussians, view: View) -> Gaussians:
+        """The head's Gaussians with the shoulders where they are in a view's frame."""
+        found = self._shoulders
+        return gaussians if found is None else found.posed(gaussians, view.frame)
 
     def __len__(self) -> int:
         """The number of Gaussians."""
@@ -278,38 +279,19 @@ class HeadTrainer:
         values = turn_values(self.turn, self._capture, frames)  # (T, 3)
         return dict(zip(frames, values, strict=True))
 
-    def _row_factors(self, frames: Sequence[int]) -> Tensor:
-        """(R,) factors of the rows' learning rates."""
-        factors = torch.ones(self.model.shape.rows)
-        if self._settings.even_rows and self.model.shape.blends:
-            factors[: self.track.size] = evening_rates(self.track, frames)
-        return factors
-
-    def _eye_rows(self) -> Tensor:
-        """(R,) the basis' rows of eyes and brows."""
-        rows = torch.zeros(self.model.shape.rows, dtype=torch.bool)
-        if self.model.shape.blends:
-            rows[: self.track.size] = is_of_eyes(self.track)
-        return rows
-
     def _update_basis(
         self, weights: Tensor, gradient: Tensor, rate: float, chosen: Tensor | None = None
     ) -> None:
-        """One step on the basis, or on that of the chosen Gaussians.
-
-        Where there are close-ups, Gaussians at the mouth learn nothing from eyes and brows, whose
-        movements fall together with those of lips by chance alone.
-        """
-        if not self._close_ups:
-            self._update_rows(weights, gradient, rate, chosen)
-            return
-        eyes = self._eyes.to(weights.device)  # (R,)
-        self._update_rows(weights * ~eyes, gradient, rate, chosen)
+        """One step on the basis, or on that of the chosen Gaussians."""
         means = self.model.means if chosen is None else self.model.means[chosen]
-        away = ~self._close_ups.at_mouth(means).to(gradient.device)  # (N or n,)
-        others = torch.nonzero(away)[:, 0]
-        others = others if chosen is None else chosen[others]
-        self._update_rows(weights * eyes, gradient[away], rate, others)
+        for rows, learning in self._rows.parts(means, self._close_ups):
+            part = weights * rows.to(weights)  # (R,)
+            if learning is None:
+                self._update_rows(part, gradient, rate, chosen)
+            else:
+                places = torch.nonzero(learning)[:, 0].to(gradient.device)  # (n,)
+                others = places if chosen is None else chosen[places]
+                self._update_rows(part, gradient[places], rate, others)
 
     def _update_rows(
         self, weights: Tensor, gradient: Tensor, rate: float, chosen: Tensor | None
@@ -320,7 +302,7 @@ class HeadTrainer:
             self.model.basis,
             weights,
             gradient,
-            rate * self._evening,
+            rate * self._rows.factors.to(weights),
             self._weight_decay,
             self._settings.basis_optimiser == "rmsprop",
             chosen,
@@ -350,7 +332,7 @@ class HeadTrainer:
         chosen = rng.choice(len(self.views), size=min(SAMPLES, len(self.views)), replace=False)
         opacities, given = [], []
         for view in (self.views[i] for i in chosen):
-            gaussians = self.model(self.expression(view))
+            gaussians = self.posed(self.model(self.expression(view)), view)
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])
         return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))

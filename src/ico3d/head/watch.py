@@ -57,7 +57,7 @@ class WatchedHead:
         expression = self._expression(frame).clone()
         for name, value in values.items():
             expression[self._inputs[name]] = value
-        return self._trainer.model(expression)
+        return self._trainer.posed(self._trainer.model(expression), self._views[frame])
 
     @torch.no_grad()
     def pictures(self, frame: int) -> tuple[Tensor, Tensor]:

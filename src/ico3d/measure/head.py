@@ -16,6 +16,7 @@ from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack, turn_values
 from ico3d.head.model_folder import TrainedHead
+from ico3d.head.shoulders import shoulders_of
 from ico3d.head.views import (
     GREY,
     SHOWS_MOUTH,
@@ -45,6 +46,8 @@ class HeadRenderer:
         """Takes the head and the capture that drives it."""
         self._head, self._capture = head, capture
         self._track: ExpressionTrack = head.track(capture)
+        pictures = PictureCache(capture, 0)
+        self._shoulders = shoulders_of(capture, head.model.shape.neck, pictures)
         self.watch = Stopwatch(head.model.device)
 
     @torch.no_grad()
@@ -55,9 +58,10 @@ class HeadRenderer:
             values = turn_values(self._head.turn, self._capture, [view.frame])  # (1, 3)
             expression = torch.cat([expression, values[0]])  # (B + 3,)
         with self.watch.picture():
-            rendering = render(
-                self._head.model(expression), [view.camera], behind.to(self._head.model.device)
-            )
+            gaussians = self._head.model(expression)
+            if self._shoulders is not None:
+                gaussians = self._shoulders.posed(gaussians, view.frame)
+            rendering = render(gaussians, [view.camera], behind.to(self._head.model.device))
         return rendering.rgb[0].clamp(0, 1).cpu().numpy()
 
 

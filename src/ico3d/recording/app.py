@@ -13,7 +13,6 @@ from typing import Any
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
 
-from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.server import add_page
 from ico3d.chat.serving.sites import Sites, add_tokens
@@ -24,10 +23,11 @@ from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError
 from ico3d.recording.guiding.coverage import covered
 from ico3d.recording.guiding.seeing import Eye, turn_of
+from ico3d.recording.keeping.body_choice import BUILDS, OUTFITS, as_form, chosen, write_choice
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import CONSENT, part_ids, scripts
-from ico3d.recording.making.makers import Makers
+from ico3d.recording.making.makers import PACKAGED, Bodies, Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE
 from ico3d.recording.making.talks import Talks
@@ -49,6 +49,7 @@ class Room:
     Attributes:
         people: The recordings.
         eye: The face tracker.
+        bodies: Which bodies avatars may get.
         makers: Processes that make avatars.
         talks: Servers of finished avatars.
         voices: Whether people are asked if their voice may be cloned, too.
@@ -57,6 +58,7 @@ class Room:
 
     people: People
     eye: Eye
+    bodies: Bodies
     makers: Makers
     talks: Talks
     voices: bool
@@ -113,8 +115,9 @@ async def _refuse(request: Request, error: Exception) -> Response:
         if error.errno not in FULL:
             raise error
         error = full_disk()
-    code, status = (error.code, error.status) if isinstance(error, Refused) else ("", 500)
-    return JSONResponse({"code": code, "error": str(error)}, status, NEVER_KEPT)
+    told = error if isinstance(error, Refused) else Refused("", str(error), 500)
+    shown = {"code": told.code, "error": str(told), "advice": [plain(one) for one in told.advice]}
+    return JSONResponse(shown, told.status, NEVER_KEPT)
 
 
 def _add_people(app: FastAPI, room: Room) -> None:
@@ -126,6 +129,9 @@ def _add_people(app: FastAPI, room: Room) -> None:
             "people": await asyncio.to_thread(room.people.names),
             "consent": {language: one.consent for language, one in scripts().items()},
             "qualities": list(QUALITIES),
+            "builds": BUILDS,
+            "outfits": OUTFITS,
+            "packaged": room.bodies.is_packaged,
             "lacking": room.eye.lacking,
             "voice": {language: one.voice for language, one in scripts().items()}
             if room.voices
@@ -181,7 +187,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         try:
             report = await asyncio.to_thread(room.eye.report, file, id)
         except Refused as error:
-            if error.code == "no-video":
+            if error.code in ("no-video", "unusable"):
                 person.discard(id, take)
             raise
         async with room.lock(name):
@@ -216,19 +222,31 @@ def _add_making(app: FastAPI, room: Room) -> None:
     """The making of an avatar, its progress, and the talk at its end."""
     making = ROOT + "{name}/making"
 
+    @app.put(ROOT + "{name}/body")
+    async def choose(name: str, request: Request) -> Response:
+        choice = chosen(await _form(request))
+        async with room.lock(name):
+            person = room.people.person(name)
+            await asyncio.to_thread(room.bodies.check, choice)
+            await asyncio.to_thread(write_choice, person.folder, choice)
+        return JSONResponse(await asyncio.to_thread(_status, room, person))
+
     @app.post(making)
     async def make(name: str, request: Request) -> Response:
-        quality = str((await _form(request)).get("quality"))
+        form = await _form(request)
+        how = str(form.get("quality")), form.get("anew") is True
         person = room.people.person(name)
         async with room.lock(name):
             await asyncio.to_thread(room.talks.stop, person.name)
-            await asyncio.to_thread(room.makers.begin, person, quality)
+            await asyncio.to_thread(room.makers.begin, person, *how)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.delete(making)
-    async def stop(name: str) -> Response:
+    async def stop(name: str, discard: bool = False) -> Response:
         person = room.people.person(name)
-        await asyncio.to_thread(room.makers.stop, person)
+        end = room.makers.discard if discard else room.makers.stop
+        async with room.lock(name):
+            await asyncio.to_thread(end, person)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.get(making + "/face")
@@ -262,9 +280,20 @@ def _status(room: Room, person: Person) -> dict[str, Any]:
         "language": language,
         "parts": parts,
         "covered": plain(covered(found.values(), language)),
-        "making": plain(room.makers.progress(person)),
+        "making": _of_making(room, person),
+        "body": as_form(room.bodies.choice(person)),
         "avatar": Places(person.folder).avatar.is_file(),
     }
+
+
+def _of_making(room: Room, person: Person) -> dict[str, Any] | None:
+    """What the page shows of a making, with what has changed since it began."""
+    progress = room.makers.progress(person)
+    if progress is None:
+        return None
+    shown = plain(progress)
+    del shown["made_of"]
+    return shown | {"changed": room.makers.changed(person, progress)}
 
 
 def _of_part(part: Any) -> dict[str, Any]:
@@ -304,12 +333,7 @@ async def _form(request: Request) -> dict[str, Any]:
 
 
 def open_room(
-    folder: Path,
-    host: str,
-    tls: bool,
-    body: Path | None = None,
-    look: Look = UNCHANGED,
-    voices: bool = False,
+    folder: Path, host: str, tls: bool, bodies: Bodies = PACKAGED, voices: bool = False
 ) -> Room:
     """What a server of the studio page shares.
 
@@ -317,10 +341,9 @@ def open_room(
         folder: Where the recordings are.
         host: Address to which it is bound.
         tls: Whether it serves by HTTPS.
-        body: A whole person whose body the avatars get; None makes heads alone.
-        look: Build and outfit of that body.
+        bodies: Which bodies avatars may get.
         voices: Whether people are asked if their voice may be cloned, too.
     """
     people = People(folder)
-    servers = Makers(people, body, look), Talks(host, tls)
-    return Room(people, Eye(), *servers, voices, defaultdict(asyncio.Lock))
+    servers = Makers(people, bodies), Talks(host, tls)
+    return Room(people, Eye(), bodies, *servers, voices, defaultdict(asyncio.Lock))

@@ -10,6 +10,7 @@ import tyro
 
 from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
 from ico3d.avatar.embodying.look import AS_RECORDED, Look, OutfitName, check_look
+from ico3d.bundle.packaged import NAME
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,11 @@ class Studio:
         tls: Serve by HTTPS, as browsers demand before they give the camera to another machine's
             page, with a certificate that this machine makes, keeps and renews.
         browser: Open the page in a browser.
-        body: A whole person on a skeleton, whose body stands in for that of everybody who records
-            themselves; `demo` is the avatar of the package. By default avatars are heads alone.
-        build: Build of that body; `medium` is the one that was recorded.
-        outfit: Colours of its clothes; `recorded` are those that were.
+        body: A whole person on a skeleton, whose body stands in for that of everybody who does not
+            choose otherwise on the page; `demo` is the avatar of the package. By default avatars
+            are heads alone for those, and who chooses a body gets that of the packaged avatar.
+        build: Build of that body, unless somebody chooses another; `medium` is the recorded one.
+        outfit: Colours of its clothes, likewise; `recorded` are those that were.
         voice: Ask people, too, whether the avatar may speak with their voice: a tick of its own,
             off unless they set it. Their voice is then cloned where OpenVoice is installed.
     """
@@ -51,9 +53,11 @@ class Studio:
             SettingsError: If others could come without HTTPS, the port is taken, the folder cannot
                 be made, or heads alone are to have a build or an outfit.
         """
+        from ico3d.chat.observing.operator_log import set_up_log
+
+        set_up_log(verbose=False)  # before what logs as soon as it is imported
         from ico3d.avatar.embodying.embody import body_in
         from ico3d.bundle.format import Bundle
-        from ico3d.chat.observing.operator_log import set_up_log
         from ico3d.chat.serving import server
         from ico3d.chat.serving.guard import LOOPBACK
         from ico3d.chat.serving.network.reach import find_reach, fragment
@@ -62,12 +66,13 @@ class Studio:
         from ico3d.creating.voice.clone import hindrance
         from ico3d.errors import SettingsError
         from ico3d.recording.app import make_app, open_room
+        from ico3d.recording.keeping.body_choice import BodyChoice
+        from ico3d.recording.making.makers import Bodies
 
         look = Look(self.build, self.outfit)
         check_look(self.body, look)
         if self.body is not None:
             body_in(Bundle.open(self.body), look)  # said before somebody records themselves
-        set_up_log(verbose=False)
         if self.host not in LOOPBACK and not self.tls:
             raise SettingsError(
                 f"--host {self.host}: browsers give their camera only to HTTPS pages, and the key "
@@ -79,7 +84,8 @@ class Studio:
         listener = server.bind(self.host, self.port)
         try:
             where = (self.folder.absolute(), self.host, self.tls)
-            room = open_room(*where, self.body, look, self.voice)
+            bodies = Bodies(self.body or Path(NAME), BodyChoice(self.body is not None, look))
+            room = open_room(*where, bodies, self.voice)
         except OSError as error:
             raise SettingsError(f"{self.folder} cannot be written ({error.strerror}).") from error
         app = make_app(room, self.host, sites, reach.answered)

@@ -1,5 +1,8 @@
 """Why the studio page's server refuses something, as sentences that the page translates."""
 
+from collections.abc import Sequence
+
+from ico3d.creating.looking.advice import Advice
 from ico3d.errors import Ico3dError
 
 
@@ -9,12 +12,13 @@ class Refused(Ico3dError):
     Attributes:
         code: Name of the sentence; the page's own words for it are those of `studio.refused.CODE`.
         status: Status of the HTTP answer.
+        advice: What is wrong with a video, where that is why.
     """
 
-    def __init__(self, code: str, text: str, status: int = 400):
+    def __init__(self, code: str, text: str, status: int = 400, advice: Sequence[Advice] = ()):
         """Takes the sentence in English, for pages that have none of their own."""
         super().__init__(text)
-        self.code, self.status = code, status
+        self.code, self.status, self.advice = code, status, tuple(advice)
 
 
 def bad_name() -> Refused:
@@ -34,3 +38,8 @@ def full_disk() -> Refused:
 def no_video() -> Refused:
     """A file of another kind."""
     return Refused("no-video", "this file is no video: choose an MP4, MOV, WebM or AVI.", 415)
+
+
+def unusable(refused: Sequence[Advice]) -> Refused:
+    """A video of which no avatar can be made, with the sentences of `ico3d create`."""
+    return Refused("unusable", " ".join(map(str, refused)), 422, refused)

@@ -1,12 +1,14 @@
 """Pictures and parts, with a tracker's double, and without a tracker."""
 
 import io
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from ico3d.capture.face.mediapipe_face import Face
+from ico3d.creating.looking import samples
 from ico3d.errors import MissingModelError
 from ico3d.recording.guiding import seeing
 from ico3d.recording.guiding.seeing import Eye, short_of, turn_of
@@ -86,8 +88,8 @@ def test_a_part_is_reported_with_its_turns(eye, tmp_path):
     report = eye.report(part_file(tmp_path / "left.mp4", 50), "left")
     assert report["seconds"] == pytest.approx(1.96)
     assert report["turn"] == [0.0, 60.0, 0.0, 0.0]
-    assert any("blurred" in text for text in report["advice"])
-    assert not any("the video lasts" in text or "lips" in text for text in report["advice"])
+    codes = [one["code"] for one in report["advice"]]
+    assert "blur" in codes and not {"length-few", "length-short", "lips-still"} & set(codes)
 
 
 def test_pictures_that_would_fill_the_memory_are_not_decoded(eye, tmp_path, monkeypatch):
@@ -99,11 +101,48 @@ def test_pictures_that_would_fill_the_memory_are_not_decoded(eye, tmp_path, monk
 
 def test_a_turn_that_is_too_small_is_told(eye, tmp_path):
     report = eye.report(part_file(tmp_path / "right.mp4"), "right")
-    assert report["advice"][-1] == "the head was turned to the right by 0°: 20° shows enough of it."
+    assert report["advice"][-1] == {
+        "code": "short-right",
+        "level": "better",
+        "values": {"n": 0, "goal": 20},
+        "spans": [],
+    }
     assert short_of("left", [0.0, 25.0, 0.0, 0.0]) == short_of("text-1", [0.0] * 4) == []
-    assert short_of("down", [0.0, 0.0, -4.5, 9.0]) == [
-        "the head was turned down by 4°: 9° shows enough of it."
-    ]
+    (short,) = short_of("down", [0.0, 0.0, -4.5, 9.0])
+    assert str(short) == "the head was turned down by 4°: 9° shows enough of it."
+
+
+@pytest.mark.parametrize(
+    ("faces", "sound", "codes"),
+    [(0, True, ["face-none"]), (2, True, ["faces"]), (1, False, ["sound-none"]), (1, True, [])],
+)
+def test_a_whole_video_is_refused_as_create_would(eye, tmp_path, monkeypatch, faces, sound, codes):
+    class Several(Tracker):
+        def faces(self, picture):
+            return super().faces(picture) * faces
+
+    @contextmanager
+    def readers():
+        yield Several(), None
+
+    monkeypatch.setattr(samples, "_readers", readers)
+    file = part_file(tmp_path / "mine.mp4", 100, sound=sound)
+    if codes:
+        with pytest.raises(Refused) as refused:
+            eye.report(file, "upload")
+        assert (refused.value.code, refused.value.status) == ("unusable", 422)
+        assert [one.code for one in refused.value.advice] == codes
+        assert str(refused.value) == " ".join(str(one) for one in refused.value.advice)
+    else:
+        report = eye.report(file, "upload")
+        assert report["seconds"] == pytest.approx(3.96) and report["turn"] is None
+        assert "length-few" in [one["code"] for one in report["advice"]]
+
+
+def test_without_the_model_a_video_without_sound_is_refused_all_the_same(blind, tmp_path):
+    with pytest.raises(Refused, match="the video has no sound"):
+        blind.report(part_file(tmp_path / "mute.mp4", sound=False), "upload")
+    assert blind.report(part_file(tmp_path / "heard.mp4"), "upload")["seconds"] == 0.96
 
 
 def test_without_the_model_a_part_is_still_kept(blind, tmp_path):

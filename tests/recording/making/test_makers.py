@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from ico3d.avatar.embodying.look import Look
+from ico3d.recording.keeping.body_choice import BodyChoice, write_choice
 from ico3d.recording.keeping.people import People
 from ico3d.recording.making import makers as room
-from ico3d.recording.making.makers import Makers
+from ico3d.recording.making.makers import Bodies, Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, read_progress, write_progress
 from ico3d.recording.refusals import Refused
@@ -120,10 +121,53 @@ def test_the_body_and_its_look_are_passed_on(people, monkeypatch):
             return 0
 
     monkeypatch.setattr(room, "start", lambda worker, words, log: asked.append(words) or Process())
-    ada = people.person("Ada")
-    for made in (Makers(people), Makers(people, Path("demo"), Look("slender", "navy"))):
+    ada, ida = people.person("Ada"), people.person("Ida")
+    slender = Bodies(Path("mine.ico3d"), BodyChoice(True, Look("slender", "navy")))
+    write_choice(ida.folder, BodyChoice(True, Look("sturdy", "wine")))
+    for made in (Makers(people), Makers(people, slender)):
         made.begin(ada, "good")
+        made.begin(ida, "good")
+    write_choice(ada.folder, BodyChoice(False))
+    made.begin(ada, "good")
     assert asked == [
         [str(ada.folder), "good"],
-        [str(ada.folder), "good", "demo", "slender", "navy"],
+        [str(ida.folder), "good", "demo", "sturdy", "wine"],
+        [str(ada.folder), "good", "mine.ico3d", "slender", "navy"],
+        [str(ida.folder), "good", "mine.ico3d", "sturdy", "wine"],
+        [str(ada.folder), "good"],
     ]
+
+
+def test_what_has_changed_since_a_making_began_is_known(people, makers):
+    ada = people.person("Ada")
+    makers.begin(ada, "good")
+    _until(_began(ada).exists)
+    makers.stop(ada)
+    assert makers.changed(ada, makers.progress(ada)) == []
+    write_choice(ada.folder, BodyChoice(True))
+    assert makers.changed(ada, makers.progress(ada)) == ["on"]
+    kept(ada, "text-2", WEBM)
+    assert makers.changed(ada, makers.progress(ada)) == ["parts", "on"]
+    makers.begin(ada, "good")
+    assert makers.changed(ada, makers.progress(ada)) == []
+
+
+def test_a_making_is_begun_anew_or_discarded_and_a_finished_avatar_stays(people, makers):
+    ada = people.person("Ada")
+    places = Places(ada.folder)
+    places.avatar.write_bytes(b"an earlier one")
+    for act in (lambda: makers.begin(ada, "good", anew=True), lambda: makers.discard(ada)):
+        makers.stop(ada)
+        makers.begin(ada, "good")
+        _until(_began(ada).exists)
+        makers.stop(ada)
+        learnt = places.folder / "learnt"
+        learnt.touch()
+        makers.begin(ada, "good")
+        assert learnt.exists()
+        makers.stop(ada)
+        act()
+        assert not learnt.exists()
+    assert makers.progress(ada) is None and not places.folder.exists()
+    assert places.avatar.read_bytes() == b"an earlier one"
+    assert {part.id for part in ada.parts()} == {"consent", "text-1"}

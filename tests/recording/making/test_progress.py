@@ -8,9 +8,17 @@ from PIL import Image
 from ico3d.creating.events import Advanced, Looked, Made, Measured, Planned, Preview, Voiced
 from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.examine import Examination
-from ico3d.recording.making.progress import FACE, Progress, Reporter, read_progress
+from ico3d.recording.making.progress import (
+    FACE,
+    Progress,
+    Reporter,
+    begun,
+    read_progress,
+    write_progress,
+)
 
-ADVICE = (Advice("blur", "better", "blurred.", ((2, 3),)), Advice("face", "refused", "no face."))
+ADVICE = (Advice("blur", spans=((2, 3),)), Advice("face-none", "refused"))
+BLUR = {"code": "blur", "level": "better", "values": {}, "spans": [[2, 3]]}
 
 
 def test_events_become_steps_time_and_pictures(tmp_path):
@@ -20,7 +28,8 @@ def test_events_become_steps_time_and_pictures(tmp_path):
     tell(Planned({"track": 10.0, "learn": 100.0, "measure": 5.0}, {}))
     found = read_progress(tmp_path)
     assert found is not None
-    assert (found.left, found.advice, found.step) == (115.0, ("at 2 to 3 s: blurred.",), "join")
+    assert (found.left, found.advice, found.step) == (115.0, (BLUR,), "join")
+    assert [one["code"] for one in found.refused] == ["face-none"]
     tell(Advanced("track", 0.5, "…"))
     assert tell.progress.left == 110.0
     tell(Advanced("learn", 0.25, "…"))
@@ -28,7 +37,10 @@ def test_events_become_steps_time_and_pictures(tmp_path):
     assert (tell.progress.share, tell.progress.left) == (0.25, 80.0)
     clock[0] = 2.0
     tell(Advanced("learn", 0.75, "…"))
-    assert (tell.progress.share, tell.progress.left) == (0.75, 30.0)
+    assert (tell.progress.share, tell.progress.left) == (
+        0.75,
+        1.2,
+    )  # 4 s, and not 100, for all of it
     tell(Preview(0.75, np.zeros((4, 8, 3), np.uint8)))
     with Image.open(tmp_path / FACE) as picture:
         assert picture.size == (8, 4)
@@ -45,9 +57,9 @@ def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
     assert len(tell.progress.advice) == 1
     tell(Voiced(0.0, "the recording is silent."))
     found = read_progress(tmp_path)
-    assert found is not None and found.advice[1:] == (
-        "The avatar is made without a voice of its own: the recording is silent.",
-    )
+    assert found is not None
+    (why,) = found.advice[1:]
+    assert (why["code"], why["values"]) == ("voice", {"why": "the recording is silent."})
 
 
 def test_what_is_damaged_is_nothing(tmp_path):
@@ -55,3 +67,20 @@ def test_what_is_damaged_is_nothing(tmp_path):
     for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}'):
         (tmp_path / "progress.json").write_text(text)
         assert read_progress(tmp_path) is None
+
+
+def test_a_progress_of_an_earlier_version_is_read(tmp_path):
+    (tmp_path / "progress.json").write_text(
+        '{"state": "made", "quality": "good", "advice": ["it is blurred."]}'
+    )
+    found = read_progress(tmp_path)
+    assert found is not None
+    assert (found.state, found.advice, found.refused) == ("made", ("it is blurred.",), ())
+
+
+def test_what_goes_on_keeps_its_pictures_and_of_what_it_is_made(tmp_path):
+    assert begun(tmp_path, "good").made_of == {}
+    before = Progress("stopped", "quick", "learn", 0.4, faces=3, made_of={"on": ["demo"]})
+    write_progress(tmp_path, before)
+    assert begun(tmp_path, "good") == Progress("running", "good", faces=3, made_of={"on": ["demo"]})
+    assert begun(tmp_path, "good", {"on": []}).made_of == {"on": []}

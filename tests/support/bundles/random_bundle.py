@@ -21,6 +21,7 @@ from ico3d.bundle.manifest import (
     Provenance,
     SpeechInfo,
 )
+from ico3d.bundle.shoulders import BakedShoulders
 
 EXPRESSION_SIZE, EYE_OFFSET, FPS, NUM_POSES = 39, 32, 25.0, 50
 
@@ -68,6 +69,15 @@ def swaying_poses(count: int) -> np.ndarray:
     poses[:, 0, 0] = poses[:, 2, 2] = np.cos(angles)
     poses[:, 0, 2], poses[:, 2, 0] = np.sin(angles), -np.sin(angles)
     return poses
+
+
+def still_shoulders(head: BakedHead, count: int) -> BakedShoulders:
+    """The lower half of the head stays behind, turned and moved, in each of `count` poses."""
+    share = np.clip(-head.means[:, 1] / 0.06, 0, 1)  # (N,)
+    places = np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
+    places[:, :3, :3] = [[0.96, -0.28, 0], [0.28, 0.96, 0], [0, 0, 1]]
+    places[:, :3, 3] = 0.02, -0.01, 0.01
+    return BakedShoulders(np.uint8(255 * share), places)
 
 
 def speech_graph(seed: int = 0) -> bytes:

@@ -1,4 +1,4 @@
-"""A maker of avatars that waits until it is ended: `python -m … FOLDER QUALITY`."""
+"""A maker of avatars that waits until it is ended: `python -m … FOLDER QUALITY …`."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ from ico3d.recording.making.beside import end_with_parent
 
 if __name__ == "__main__":
     end_with_parent()
-    folder, quality = sys.argv[1:]
+    folder, quality, *_ = sys.argv[1:]
     Path(folder, "making", "began").write_text(quality)
     if quality == "quick":  # it falls over
         sys.exit(3)

@@ -43,11 +43,15 @@ const isSeen = (selector: string) =>
   });
 const filesOf = (id: string) => (existsSync(parts) ? readdirSync(parts).filter((name) => name.startsWith(`${id}.`)).toSorted() : []);
 
-/** Records the chosen part until the server has some of it. */
-async function record(): Promise<void> {
+/** Records the chosen part for some seconds: the server has some of it then. */
+async function record(seconds = 1): Promise<void> {
   await browser.page.click('#record');
-  await browser.page.waitForFunction(() => /[1-9] s/.test(document.querySelector('#clock')!.textContent!), undefined, PATIENCE);
+  const isLong = (least: number) => Number(/(\d+) s/.exec(document.querySelector('#clock')!.textContent!)?.[1] ?? 0) >= least;
+  await browser.page.waitForFunction(isLong, seconds, PATIENCE);
 }
+
+/** How full the meter of a row is: 0 for time, 1 for texts. */
+const meterOf = (row: number) => browser.page.$$eval('#meters > dd > meter', (meters, n) => (meters[n] as HTMLMeterElement).value, row);
 
 test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything deleted', async () => {
   const page = await open();
@@ -74,11 +78,15 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   expect(readFileSync(join(folder, 'Ida', 'consent.json'), 'utf8')).toContain('ticked and spoken');
 
   await page.click('[data-part=text-1]');
+  expect([await meterOf(0), await meterOf(1)]).toEqual([0, 0]);
   await record();
+  expect(await meterOf(0)).toBeGreaterThan(0); // they move while somebody reads
+  expect(await meterOf(1)).toBeGreaterThan(0);
   await page.click('#record');
   await reached('text-1', 'kept');
   const first = statSync(join(parts, 'text-1.webm')).mtimeMs;
-  expect(await page.textContent('#meters')).toContain('of 45');
+  expect(await page.textContent('#meters')).toContain('1 of 6');
+  expect(await page.textContent('#sounds')).toMatch(/^Read the texts aloud, .* all 45 speech sounds of the language\. \d+ of them are recorded\.$/);
   await page.selectOption('#language', 'de');
   expect(await page.textContent('#clock')).toBe(''); // nothing of what is over comes back in another language
   await page.selectOption('#language', 'en');
@@ -88,7 +96,7 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   await page.click('#play');
   await page.waitForFunction(() => document.querySelector<HTMLVideoElement>('#replay')!.videoWidth > 0);
   await page.click('#close');
-  await record(); // a retake
+  await record(5); // a retake, long enough to pass for a whole video
   expect(statSync(join(parts, 'text-1.webm')).mtimeMs).toBe(first);
   await page.click('#record');
   await expect.poll(() => statSync(join(parts, 'text-1.webm')).mtimeMs, PATIENCE).toBeGreaterThan(first);
@@ -201,11 +209,36 @@ test.skipIf(!demo)('who leaves while it records, and who was deleted in another 
   await other.close();
   await page.click('#salvage');
   await page.waitForSelector('#start:visible');
-  await expect.poll(() => page.textContent('#problem'), PATIENCE).toBe('Everything of Eva is gone.');
+  await expect.poll(() => page.textContent('#problem'), PATIENCE).toMatch(/^Eva was deleted elsewhere, .* begin a new recording here\.$/);
   await page.click('#people button');
   await page.waitForSelector('#room:visible');
   expect(await page.textContent('#title')).toBe('Ola');
   expect(await page.isVisible('#problem')).toBe(false); // that was of somebody else
+}, 120_000);
+
+test.skipIf(!demo)('a disk that fills up while it records is told, and what has arrived can be kept', async () => {
+  const own = join(scratchFolder(), 'full');
+  const full = await ChatServer.limited(own, 150_000);
+  try {
+    browser = await Browser.launch({ width: 1280, height: 800, microphone: voice, camera });
+    const { page } = browser;
+    await page.goto(full.url);
+    await page.fill('#name', 'Ida');
+    await page.check('#agreed');
+    await page.click('#begin');
+    await page.click('#open');
+    await page.click('#record');
+    await page.waitForSelector('#problem:visible', PATIENCE);
+    expect(await page.textContent('#problem')).toMatch(/^The disk is full: free some space and go on\. What was recorded is kept\.$/);
+    await reached('consent', 'broken');
+    const [part] = readdirSync(join(own, 'Ida', 'parts'));
+    expect(statSync(join(own, 'Ida', 'parts', part!)).size).toBeGreaterThan(10_000);
+    await page.click('#salvage');
+    await reached('consent', 'kept');
+    expect(await page.isEnabled('[data-part=text-1]')).toBe(true);
+  } finally {
+    await full.stop();
+  }
 }, 120_000);
 
 test.skipIf(!demo)('a camera that is not given, and a server that is gone, are told', async () => {

@@ -10,6 +10,13 @@ export interface HeadFiles {
   info: HeadInfo;
   baked: BakedHead; // its most important Gaussians, if others have a file of their own
   poses: Float32Array; // (F,4,4) row-major world_from_head
+  shoulders: ShouldersFile | null; // null where all follows the head
+}
+
+/** How the shoulders of a head alone stand. */
+export interface ShouldersFile {
+  share: Uint8Array; // (N,) how much each Gaussian moves with them, of 255
+  poses: Float32Array; // (F,4,4) row-major world_from_shoulders
 }
 
 /** The names that splats behind a person may have. */
@@ -17,6 +24,7 @@ const BACKGROUNDS = ['background.spz', 'background.ply'];
 
 const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
 const HEAD_REST = 'head_rest.safetensors';
+const SHOULDERS = 'head_shoulders.safetensors';
 const ANIMATION = 'animation.json';
 
 /** The file of a body on a skeleton. */
@@ -46,7 +54,7 @@ export async function loadManifest(locate: Locate, signal?: AbortSignal): Promis
  * @param alone nothing is shown behind them
  */
 export function filesToFirstSight({ head, body, skinned, files }: Manifest, alone = false): string[] {
-  const names: string[] = head ? [...HEAD_FILES] : [];
+  const names: string[] = head ? [...HEAD_FILES, SHOULDERS] : [];
   if (head && (body || skinned)) names.push(ANIMATION);
   if (body && !head) names.push(body.windows[0]!.file);
   if (skinned) names.push(SKINNED, GESTURES);
@@ -99,11 +107,23 @@ export class BundleFiles {
 
   /** A head, ready for the GPU. */
   async head(info: HeadInfo): Promise<HeadFiles> {
-    const [head, poses] = await Promise.all(HEAD_FILES.map((name) => this.tensors(name)));
+    const coming = HEAD_FILES.map((name) => this.tensors(name));
+    const [[head, poses], shoulders] = await Promise.all([Promise.all(coming), this.shoulders(info)]);
     return {
       info,
       baked: readBakedHead(head!, info, HEAD_FILES[0]),
       poses: takeTensor(poses!, 'world_from_head', 'F32', [info.num_poses, 4, 4], HEAD_FILES[1]).data as Float32Array,
+      shoulders,
+    };
+  }
+
+  /** How the shoulders of a head alone stand, if they do not follow it. */
+  private async shoulders({ num_gaussians, num_poses }: HeadInfo): Promise<ShouldersFile | null> {
+    if (!(SHOULDERS in this.promised)) return null;
+    const tensors = await this.tensors(SHOULDERS);
+    return {
+      share: takeTensor(tensors, 'share', 'U8', [num_gaussians], SHOULDERS).data as Uint8Array,
+      poses: takeTensor(tensors, 'world_from_shoulders', 'F32', [num_poses, 4, 4], SHOULDERS).data as Float32Array,
     };
   }
 

@@ -1,37 +1,56 @@
 import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
 import { Generator } from '../gaussians/generator.ts';
 import { coefficients } from './coefficients.ts';
-import { SoftHead } from './soft.ts';
+import { MOTION_SIZE, STILL } from './shoulders.ts';
+import { SoftHead, type ShownRows } from './soft.ts';
 
 /** The head as a generator: Gaussians from a baked basis and K coefficients. */
 export class HeadGenerator extends Generator {
   /** The first Gaussians, and those that came later. */
-  readonly parts: HeadRows[];
-  /** Coefficients of the expression shown, (K,). */
+  readonly parts: ShownRows[];
+  /** Coefficients of the expression shown (K,), and the motion of the shoulders (7,). */
+  readonly values: Float32Array;
   readonly shown: Float32Array;
+  /** How the shoulders have moved against the head: rotation wxyz, shift. */
+  readonly bent: Float32Array;
   /** Share of their opacity that Gaussians have which came later. */
   grown = 0;
   readonly soft: SoftHead;
   private readonly network: BakedHead['network'];
+  private readonly share: Uint8Array;
 
-  /** @param capacity number of all its Gaussians, of which `head` may have the first only */
-  constructor(head: BakedHead, capacity = head.count) {
+  /**
+   * @param capacity number of all its Gaussians, of which `head` may have the first only
+   * @param share (capacity,) how much each moves with the shoulders, of 255
+   */
+  constructor(head: BakedHead, capacity = head.count, share: Uint8Array = new Uint8Array(capacity)) {
     super(capacity);
-    this.parts = [head];
-    this.shown = new Float32Array(head.rank);
+    this.share = share;
+    this.parts = [{ ...head, share: share.subarray(0, head.count) }];
+    this.values = new Float32Array(head.rank + MOTION_SIZE);
+    this.shown = this.values.subarray(0, head.rank);
+    this.bent = this.values.subarray(head.rank);
+    this.bent.set(STILL);
     this.soft = new SoftHead(this);
     this.network = head.network;
   }
 
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
   complete(rest: HeadRows): void {
-    this.parts.push(rest);
+    const first = this.parts[0]!.count;
+    this.parts.push({ ...rest, share: this.share.subarray(first, first + rest.count) });
     this.changed();
   }
 
   /** Shows the Gaussians that came later with a share of their opacity. */
   grow(share: number): void {
     this.grown = share;
+    this.changed();
+  }
+
+  /** Moves the shoulders against the head: rotation wxyz with w ≥ 0, and shift in metres. */
+  bend(motion: Float32Array): void {
+    this.bent.set(motion);
     this.changed();
   }
 

@@ -7,6 +7,7 @@ import { Growth } from '../gaussians/growth.ts';
 import type { Quat, Vector } from '../rig/quaternions.ts';
 import { HeadGenerator } from './generator.ts';
 import { backAndForth, Poses } from './poses.ts';
+import { Shoulders } from './shoulders.ts';
 
 /** What the face shows, decided anew each tick. */
 export interface Director {
@@ -37,11 +38,13 @@ export class Head implements Actor {
   row = NaN; // of the poses, as shown
   private readonly carrier: Carrier;
   private readonly poses: Poses;
+  private readonly shoulders: Shoulders | null;
   private readonly growth: Growth;
 
-  constructor({ info, baked, poses }: HeadFiles, carrier: Carrier) {
+  constructor({ info, baked, poses, shoulders }: HeadFiles, carrier: Carrier) {
     this.carrier = carrier;
-    this.generator = new HeadGenerator(baked, info.num_gaussians);
+    this.generator = new HeadGenerator(baked, info.num_gaussians, shoulders?.share);
+    this.shoulders = shoulders && new Shoulders(shoulders);
     this.objects = [this.generator];
     this.poses = new Poses(poses);
     this.expression = new Float32Array(info.expression_size);
@@ -72,6 +75,7 @@ export class Head implements Actor {
     this.row = row;
     this.poses.apply(row, this.generator);
     if (this.motion) move(this.generator, ...this.motion());
+    if (this.shoulders) this.generator.bend(this.shoulders.motion(row, this.generator));
   }
 
   tick(step: number): boolean {

@@ -21,7 +21,7 @@ export class Poses {
   }
 
   /** Writes the pose at a row, between two or held at the ends, to an object. */
-  apply(row: number, object: THREE.Object3D): void {
+  apply(row: number, object: { position: THREE.Vector3; quaternion: THREE.Quaternion }): void {
     const last = this.count - 1;
     const at = Math.min(Math.max(row, 0), last);
     const index = Math.floor(at);

@@ -2,17 +2,22 @@ import type { HeadRows } from '../bundle/baked-head.ts';
 import { PackedParts } from '../soft/parts.ts';
 import { makeRows, ROW_BYTES, type Late, type SoftObject, type Source } from '../soft/source.ts';
 
+/** Gaussians of a head, and how much each moves with the shoulders, of 255. */
+export interface ShownRows extends HeadRows {
+  share: Uint8Array; // (N,)
+}
+
 /** A head as it is now. */
 export interface HeadNow {
-  readonly parts: readonly HeadRows[];
-  readonly shown: Float32Array; // (K,) coefficients
+  readonly parts: readonly ShownRows[];
+  readonly values: Float32Array; // (K,) coefficients, (7,) motion of the shoulders
   readonly grown: number; // share of what came after the first part that is seen
 }
 
 /** A head for the processor's path. */
 export class SoftHead implements SoftObject {
   private readonly head: HeadNow;
-  private readonly packed: PackedParts<HeadRows>;
+  private readonly packed: PackedParts<ShownRows>;
 
   constructor(head: HeadNow) {
     this.head = head;
@@ -32,11 +37,11 @@ export class SoftHead implements SoftObject {
   }
 
   get values(): Float32Array {
-    return this.head.shown;
+    return this.head.values;
   }
 }
 
-function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis }: HeadRows): Source {
+function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis, share }: ShownRows): Source {
   const stride = ROW_BYTES.head + 4 * rank;
   const { rows, floats } = makeRows(count, stride);
   const bytes = new Int8Array(rows);
@@ -47,6 +52,7 @@ function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis
     for (let k = 0; k < 3; k++) floats[at + 7 + k] = Math.exp(scales[3 * i + k]!);
     floats[at + 10] = basisScale[i]!;
     floats.set(meanLogits.subarray(4 * i, 4 * i + 4), at + 11);
+    floats[at + 15] = share[i]! / 255;
     for (let k = 0; k < rank; k++) {
       const from = 4 * (count * k + i);
       bytes.set(basis.subarray(from, from + 4), i * stride + ROW_BYTES.head + 4 * k);

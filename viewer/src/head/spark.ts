@@ -3,9 +3,11 @@ import * as THREE from 'three';
 import type { HeadRows } from '../bundle/baked-head.ts';
 import { SparkTwin } from '../gaussians/spark.ts';
 import type { HeadGenerator } from './generator.ts';
+import { MOTION_SIZE } from './shoulders.ts';
+import type { ShownRows } from './soft.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
-const REST_LAYERS = 4; // centre + basis scale, quaternion, scales, mean logits
+const REST_LAYERS = 4; // centre + basis scale, quaternion, scales + share of the shoulders' motion, mean logits
 const PACKED = 4; // basis vectors in a texel: a fetch costs far more than taking them apart
 
 /** The head as Spark draws it: a shader makes Gaussian i from textures and K coefficients; no opacity is ever 0 (sigmoid). */
@@ -31,6 +33,7 @@ export class SparkHead extends SparkTwin {
       headCoefficients: { value: head.shown },
       headFirst: { value: count },
       headGrown: grown,
+      headBend: { value: head.bent },
     };
     super(head, { declarations: declarations(rank), uniforms, statements: (index, gsplat) => statements(rank, index, gsplat) }, follow);
   }
@@ -43,6 +46,10 @@ function declarations(rank: number): string {
     uniform float headCoefficients[${rank}];
     uniform int headFirst;
     uniform float headGrown;
+    uniform float headBend[${MOTION_SIZE}];
+    vec4 headTurned(vec4 a, vec4 b) {
+      return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
+    }
     vec4 headVector(uvec4 four, int left) {
       return vec4(ivec4(four << left) >> 24);
     }
@@ -72,7 +79,15 @@ function statements(rank: number, index: string, gsplat: string): string[] {
       ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
       ${gsplat}.center = centreAndScale.xyz;
       ${gsplat}.quaternion = texelFetch(headRest, ivec3(texel, 1), 0);
-      ${gsplat}.scales = texelFetch(headRest, ivec3(texel, 2), 0).xyz;
+      vec4 scalesAndShare = texelFetch(headRest, ivec3(texel, 2), 0);
+      ${gsplat}.scales = scalesAndShare.xyz;
+      if (scalesAndShare.w > 0.0) {
+        vec4 bend = vec4(headBend[1], headBend[2], headBend[3], headBend[0]);
+        vec3 across = cross(bend.xyz, ${gsplat}.center) + bend.w * ${gsplat}.center;
+        vec3 shift = 2.0 * cross(bend.xyz, across) + vec3(headBend[4], headBend[5], headBend[6]);
+        ${gsplat}.center += scalesAndShare.w * shift;
+        ${gsplat}.quaternion = normalize(headTurned(mix(vec4(0.0, 0.0, 0.0, 1.0), bend, scalesAndShare.w), ${gsplat}.quaternion));
+      }
       ${gsplat}.rgba = 1.0 / (1.0 + exp(-logits));
       ${gsplat}.rgba.a *= grown;
     }
@@ -100,14 +115,14 @@ function makeTexels(capacity: number, rank: number): Texels {
 }
 
 /** Writes Gaussians from number `begin` on. */
-function fill({ rest, basis }: Texels, rows: HeadRows, begin: number): void {
+function fill({ rest, basis }: Texels, rows: ShownRows, begin: number): void {
   fillRest(rest.image.data as Float32Array, rest.image.height, rows, begin);
   fillBasis(basis.image.data as Uint32Array, basis.image.height, rows, begin);
   rest.needsUpdate = basis.needsUpdate = true;
 }
 
-function fillRest(texels: Float32Array, height: number, rows: HeadRows, begin: number): void {
-  const { count, means, quats, scales, meanLogits, basisScale } = rows;
+function fillRest(texels: Float32Array, height: number, rows: ShownRows, begin: number): void {
+  const { count, means, quats, scales, meanLogits, basisScale, share } = rows;
   const layer = 4 * WIDTH * height;
   for (let i = 0; i < count; i++) {
     const [w, x, y, z] = quats.subarray(4 * i);
@@ -115,7 +130,7 @@ function fillRest(texels: Float32Array, height: number, rows: HeadRows, begin: n
     const at = 4 * (begin + i);
     texels.set([means[3 * i]!, means[3 * i + 1]!, means[3 * i + 2]!, basisScale[i]!], at);
     texels.set(normalised(x!, y!, z!, w!), layer + at); // Spark: xyzw
-    texels.set([Math.exp(s[0]!), Math.exp(s[1]!), Math.exp(s[2]!), 0], 2 * layer + at);
+    texels.set([Math.exp(s[0]!), Math.exp(s[1]!), Math.exp(s[2]!), share[i]! / 255], 2 * layer + at);
     texels.set(meanLogits.subarray(4 * i, 4 * i + 4), 3 * layer + at);
   }
 }

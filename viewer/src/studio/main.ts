@@ -3,8 +3,10 @@ import '../ui/style/buttons.css';
 import '../ui/style/scrolling.css';
 import '../ui/style/theme.css';
 import './studio.css';
+import './bodies.css';
 import { admit, byKey } from '../admission.ts';
 import { sentenceOf } from '../errors.ts';
+import { every } from '../lifetime.ts';
 import { Server } from '../server.ts';
 import { byId } from '../ui/elements.ts';
 import { offerLanguages } from '../ui/sheets/languages.ts';
@@ -13,11 +15,13 @@ import { PageWords } from '../words/page-words.ts';
 import studio from '../words/studio.json';
 import { addTexts, say, type Sentence } from '../words/text.ts';
 import { MakingView } from './making.ts';
+import { Place } from './place.ts';
 import { Recordings, Refusal, type Overview, type Status } from './recordings.ts';
 import { Room } from './room.ts';
 
 const UNADMITTED = 401;
 const UNKNOWN = 404;
+const WATCHED = 5000; // ms between two looks whether somebody is still there, and what other tabs have changed
 
 addTexts(studio);
 const root = document.documentElement;
@@ -26,10 +30,20 @@ const { signal } = new AbortController(); // as long as the page is there
 const secrets = new URLSearchParams(location.hash.slice(1)); // what browsers send nowhere
 const server = new Server(new URL(location.href));
 const recordings = new Recordings(server);
+const place = new Place();
 let overview: Overview | null = null;
 let person: Status | null = null;
 
-const ports = { words, recordings, problem, failed, changed: showPerson };
+const ports = {
+  words,
+  recordings,
+  problem,
+  failed,
+  changed: showPerson,
+  chosen: (part: string) => place.choose(part),
+  confirm: (question: Sentence) => confirm(words.text(question)),
+  anew: () => room.make(),
+};
 const room = new Room(root, ports, signal);
 const making = new MakingView(root, ports, signal);
 
@@ -56,8 +70,27 @@ async function leaveIfGone(): Promise<void> {
   if (name === undefined) return;
   const isGone = await recordings.status(name).then(() => false, isUnknown);
   if (!isGone || person?.name !== name) return;
+  await leaveDeleted(name);
+}
+
+/** Says of somebody whose recordings are gone that a new one can begin. */
+async function leaveDeleted(name: string): Promise<void> {
   await showStart();
-  problem(say('studio.deleted', { name }));
+  problem(say('studio.gone', { name }));
+  byId(root, 'name').focus();
+}
+
+/** Looks what has become of the person meanwhile, unless something of them is on its way. */
+async function watch(): Promise<void> {
+  const name = person?.name;
+  if (name === undefined || document.hidden || room.isBusy) return;
+  try {
+    const now = await recordings.status(name);
+    const isOther = JSON.stringify(now) !== JSON.stringify(person);
+    if (isOther && person?.name === name && !room.isBusy) showPerson(now);
+  } catch (error) {
+    if (isUnknown(error) && person?.name === name) await leaveDeleted(name);
+  }
 }
 
 function show(...sections: string[]): void {
@@ -68,11 +101,12 @@ function show(...sections: string[]): void {
 /** Shows a person: what is recorded, and the avatar as it is made. */
 function showPerson(status: Status): void {
   person = status;
+  place.open(status.name);
   const state = status.making?.state;
-  show(...(state ? ['making'] : []), ...(state === 'running' ? [] : ['room']));
+  show(...(state || status.avatar ? ['making'] : []), ...(state === 'running' ? [] : ['room']));
   words.write(byId(root, 'title'), status.name);
   words.write(byId(root, 'delete'), say('studio.delete', { name: status.name }));
-  room.show(status);
+  room.show(status, place.part);
   making.show(status);
 }
 
@@ -81,10 +115,10 @@ async function showStart(): Promise<void> {
   room.leave();
   making.show(null);
   person = null;
+  place.open(null);
   words.write(byId(root, 'title'), say('studio.title'));
-  overview = await recordings.overview();
-  room.equip(overview);
-  const names = overview.people.map((name) => {
+  await equip();
+  const names = overview!.people.map((name) => {
     const row = document.createElement('li');
     const button = document.createElement('button');
     button.textContent = name;
@@ -102,6 +136,26 @@ async function showStart(): Promise<void> {
   show('start');
 }
 
+/** Asks whose recordings there are, and what the server can do. */
+async function equip(): Promise<void> {
+  overview = await recordings.overview();
+  room.equip(overview);
+}
+
+/** Shows what the address of the page says: somebody's recording, or where one begins. */
+async function showPlace(): Promise<void> {
+  const name = place.person;
+  if (name === null) return showStart();
+  room.leave();
+  making.show(null);
+  await equip();
+  const status = await recordings.status(name).catch((error) => {
+    if (isUnknown(error)) return null;
+    throw error;
+  });
+  await (status ? showPerson(status) : leaveDeleted(name));
+}
+
 /** The sentences to agree to, with the name as far as it is typed. */
 function showSentence(): void {
   const name = byId<HTMLInputElement>(root, 'name').value.trim() || '____';
@@ -116,7 +170,7 @@ function showSentence(): void {
 async function enter(key: string | null): Promise<void> {
   try {
     if (key) await admit(server, byKey(server, key), say('error.key'), signal);
-    await showStart();
+    await showPlace();
   } catch (error) {
     const isLocked = key !== null || (error instanceof Refusal && error.status === UNADMITTED);
     if (isLocked) show('door');
@@ -153,6 +207,13 @@ byId(root, 'delete').onclick = async () => {
     failed(error);
   }
 };
+addEventListener('popstate', () => {
+  problem(null);
+  void showPlace().catch(failed);
+});
+addEventListener('pageshow', ({ persisted }) => persisted && void watch()); // the browser's Back
+document.addEventListener('visibilitychange', () => void watch());
+every(WATCHED, signal, () => void watch());
 offerLanguages(byId(root, 'language'), words, signal);
 followTheme(root, () => {}, signal);
 void enter(secrets.get('key'));

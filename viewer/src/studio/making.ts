@@ -2,7 +2,8 @@ import { every } from '../lifetime.ts';
 import { byId } from '../ui/elements.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say, type Key, type Sentence } from '../words/text.ts';
-import { item } from './items.ts';
+import { adviceOf, showAdvice, together } from './advice.ts';
+import { madeOf } from './bodies.ts';
 import type { Making, Recordings, Status } from './recordings.ts';
 
 const STEPS = ['join', 'look', 'track', 'learn', 'measure', 'bake'] as const;
@@ -16,6 +17,10 @@ export interface MakingPorts {
   problem(sentence: Sentence | null): void;
   failed(error: unknown): void;
   changed(status: Status): void;
+  /** Begins from nothing, as the form below says. */
+  anew(): void;
+  /** Asks a question that is answered by yes or no. */
+  confirm(question: Sentence): boolean;
 }
 
 /** Shows the avatar as it is made: the steps in words, the face in pictures, and the talk at the end. */
@@ -33,6 +38,10 @@ export class MakingView {
     const { recordings } = ports;
     this.on('halt', async ({ name }) => ports.changed(await recordings.halt(name)));
     this.on('again', async ({ name, making }) => ports.changed(await recordings.make(name, making!.quality)));
+    this.on('anew', async () => ports.anew());
+    this.on('discard', async ({ name }) => {
+      if (ports.confirm(say('studio.making.discard.sure'))) ports.changed(await recordings.discard(name));
+    });
     this.on('talk', ({ name }) => this.talk(name));
     every(ASKED, signal, () => void this.ask().catch(ports.failed));
   }
@@ -41,7 +50,7 @@ export class MakingView {
   show(status: Status | null): void {
     if (status?.name !== this.status?.name) this.faces = 0;
     this.status = status;
-    if (status?.making) this.write(status, status.making);
+    if (status) this.write(status, status.making);
   }
 
   private on(id: string, act: (status: Status) => Promise<void>): void {
@@ -79,23 +88,38 @@ export class MakingView {
     }
   }
 
-  private write(status: Status, making: Making): void {
+  private write(status: Status, making: Making | null): void {
     const { root } = this;
     const { words } = this.ports;
-    const isRunning = making.state === 'running';
+    const state = making?.state ?? 'made'; // of a making that was discarded is left what was finished before
+    const isRunning = state === 'running';
+    const isOver = state === 'stopped' || state === 'failed';
     words.write(byId(root, 'made'), titleOf(status, making));
-    byId(root, 'error').textContent = making.error;
-    words.write(byId(root, 'left'), isRunning ? leftOf(making.left) : '');
-    byId(root, 'steps').replaceChildren(...STEPS.map((step, number) => this.entry(step, number, making)));
-    byId(root, 'steps').hidden = making.state === 'made';
-    this.showFace(status.name, making.faces);
-    const decibels = making.decibels === null ? '' : say('studio.making.decibels', { n: Math.round(10 * making.decibels) / 10 });
-    words.write(byId(root, 'decibels'), decibels);
+    this.showError(making);
+    words.write(byId(root, 'made-of'), making && !isOver && !making.changed.includes('on') ? madeOf(status.body) : '');
+    words.write(byId(root, 'left'), isRunning ? leftOf(making!.left) : '');
+    byId(root, 'steps').replaceChildren(...(making ? STEPS.map((step, number) => this.entry(step, number, making)) : []));
+    byId(root, 'steps').hidden = state === 'made';
+    this.showFace(status.name, making?.faces ?? 0);
+    const decibels = making?.decibels ?? null;
+    words.write(byId(root, 'decibels'), decibels === null ? '' : say('studio.making.decibels', { n: Math.round(10 * decibels) / 10 }));
     byId(root, 'halt').hidden = byId(root, 'closing').hidden = !isRunning;
-    byId(root, 'again').hidden = isRunning || making.state === 'made';
+    byId(root, 'again').hidden = !isOver || !canGoOn(making!);
+    byId(root, 'anew').hidden = byId(root, 'discard').hidden = !isOver;
+    words.write(byId(root, 'choices'), isOver ? choicesOf(making!) : '');
     byId(root, 'talk').hidden = !status.avatar || isRunning;
-    byId(root, 'better').hidden = making.advice.length === 0;
-    byId(root, 'betters').replaceChildren(...making.advice.map(item));
+    const advice = making?.advice ?? [];
+    byId(root, 'better').hidden = advice.length === 0;
+    showAdvice(byId(root, 'betters'), words, advice);
+  }
+
+  /** Says why it failed: of the video in the words of the page, of all else in English. */
+  private showError(making: Making | null): void {
+    const shown = byId(this.root, 'error');
+    const ofVideo = making?.refused ?? [];
+    shown.lang = ofVideo.length > 0 ? this.ports.words.language : 'en';
+    const isTold = making?.state === 'failed';
+    this.ports.words.write(shown, !isTold ? '' : ofVideo.length > 0 ? together(ofVideo.map(adviceOf)) : making.error);
   }
 
   private entry(step: (typeof STEPS)[number], number: number, making: Making): HTMLLIElement {
@@ -123,8 +147,21 @@ export class MakingView {
   }
 }
 
-function titleOf({ name }: Status, { state }: Making): Sentence {
-  return state === 'running' ? say('studio.making', { name }) : say(`studio.making.${state}`, { name });
+function titleOf({ name }: Status, making: Making | null): Sentence {
+  if (making?.state === 'running') return say('studio.making', { name });
+  if (making?.state !== 'stopped') return say(`studio.making.${making?.state ?? 'made'}`, { name });
+  return say('studio.making.stopped', { step: say(`studio.step.${making.step}` as Key), n: Math.floor(100 * making.share) });
+}
+
+/** Whether it can go on where it ended: with other recordings, or such as nothing can be made of, it cannot. */
+function canGoOn({ changed, refused }: Making): boolean {
+  return !changed.includes('parts') && refused.length === 0;
+}
+
+/** What each button does. */
+function choicesOf(making: Making): Sentence {
+  if (canGoOn(making)) return say('studio.making.choices');
+  return say(making.changed.includes('parts') ? 'studio.making.changed' : 'studio.making.over');
 }
 
 /** @param seconds that are left, if anybody knows */

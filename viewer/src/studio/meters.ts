@@ -2,14 +2,32 @@ import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { TURNS, type Status } from './recordings.ts';
 
-/** Shows how much of what an avatar learns from has been recorded: time, sounds, turns of the head. */
-export function showMeters(list: HTMLElement, words: PageWords, covered: Status['covered']): void {
-  const { seconds, enough, sounds, of_sounds: all, turns } = covered;
+const TEXT = 8; // s after which the meter shows a text that is being read as read
+
+/** The part that is being recorded just now, and for how many seconds. */
+export interface Recorded {
+  part: string;
+  seconds: number;
+}
+
+/** Shows how much of what an avatar learns from has been recorded: time, texts, turns of the head. */
+export function showMeters(list: HTMLElement, words: PageWords, status: Status, now: Recorded | null): void {
+  const { seconds, enough, turns } = status.covered;
+  const texts = status.parts.filter(({ id }) => id.startsWith('text-'));
+  const read = texts.filter(({ state }) => state === 'kept').length;
+  const isNew = texts.some(({ id, state }) => id === now?.part && state !== 'kept');
+  const reading = now && isNew ? Math.min(1, now.seconds / TEXT) : 0;
+  const time = seconds + (now && now.part !== 'consent' ? now.seconds : 0);
   list.replaceChildren(
-    ...row(words, say('studio.meter.time'), seconds / enough, say('studio.meter.seconds', { n: Math.round(seconds), all: enough })),
-    ...row(words, say('studio.meter.sounds'), sounds / all, say('studio.meter.of', { n: sounds, all })),
+    ...row(words, say('studio.meter.time'), time / enough, say('studio.meter.seconds', { n: Math.round(time), all: enough })),
+    ...row(words, say('studio.meter.texts'), (read + reading) / texts.length, say('studio.meter.of', { n: read, all: texts.length })),
     ...turnRow(words, turns),
   );
+}
+
+/** What to do about sounds that are not recorded yet; nothing once all are. */
+export function soundsOf({ sounds, of_sounds: all }: Status['covered']): Sentence {
+  return sounds < all ? say('studio.meter.about', { n: sounds, all }) : '';
 }
 
 function row(words: PageWords, title: Sentence, share: number, told: Sentence): HTMLElement[] {

@@ -1,6 +1,7 @@
 import { PageError } from '../errors.ts';
 import type { Server } from '../server.ts';
 import { isKey, say } from '../words/text.ts';
+import { adviceOf, together, type Advice } from './advice.ts';
 
 /** One part of a recording, as the server tells it. */
 export interface Part {
@@ -9,7 +10,7 @@ export interface Part {
   state: 'missing' | 'broken' | 'kept';
   take?: string; // of a part that broke off
   seconds?: number;
-  advice?: string[]; // in English
+  advice?: (Advice | string)[];
 }
 
 /** Ways to turn the head. */
@@ -23,10 +24,19 @@ export interface Making {
   step: string;
   share: number;
   left: number | null; // s
-  advice: string[]; // in English
+  advice: (Advice | string)[];
+  refused: Advice[]; // why nothing can be made of the video
   faces: number; // pictures of the face so far
   error: string; // in English
   decibels: number | null;
+  changed: ('parts' | 'on')[]; // what is another since: the recordings, the body
+}
+
+/** Which body an avatar gets. */
+export interface Body {
+  wanted: boolean; // else it is a head with shoulders
+  build: string;
+  outfit: string;
 }
 
 /** Everything about one person. */
@@ -36,6 +46,7 @@ export interface Status {
   parts: Part[];
   covered: { seconds: number; enough: number; turns: Turns; sounds: number; of_sounds: number };
   making: Making | null;
+  body: Body;
   avatar: boolean;
 }
 
@@ -44,6 +55,9 @@ export interface Overview {
   people: string[];
   consent: Record<string, string>;
   qualities: string[];
+  builds: string[];
+  outfits: string[];
+  packaged: boolean; // whether the body is that of the packaged avatar, of which there are pictures
   lacking: string; // why there is no face tracker
   voice: Record<string, string>; // agreed to besides, if the voice may be cloned; empty where nobody is asked
   mute: boolean; // whether the server lacks what clones voices
@@ -59,9 +73,10 @@ export interface Told {
 export class Refusal extends PageError {
   readonly status: number;
 
-  constructor(status: number, code: string, text: string) {
+  constructor(status: number, code: string, text: string, advice: readonly Advice[] = []) {
     const key = `studio.refused.${code}`;
-    super(status === 0 ? say('studio.lost') : isKey(key) ? say(key) : text);
+    const values = advice.length > 0 ? { why: together(advice.map(adviceOf)) } : undefined;
+    super(status === 0 ? say('studio.lost') : isKey(key) ? say(key, values) : text);
     this.status = status;
   }
 }
@@ -106,12 +121,20 @@ export class Recordings {
     return this.ask('POST', at(name, 'look'), picture, { part });
   }
 
-  make(name: string, quality: string): Promise<Status> {
-    return this.ask('POST', at(name, 'making'), JSON.stringify({ quality }));
+  choose(name: string, body: Body): Promise<Status> {
+    return this.ask('PUT', at(name, 'body'), JSON.stringify(body));
+  }
+
+  make(name: string, quality: string, anew = false): Promise<Status> {
+    return this.ask('POST', at(name, 'making'), JSON.stringify({ quality, anew }));
   }
 
   halt(name: string): Promise<Status> {
     return this.ask('DELETE', at(name, 'making'));
+  }
+
+  discard(name: string): Promise<Status> {
+    return this.ask('DELETE', at(name, 'making'), undefined, { discard: 'true' });
   }
 
   talk(name: string): Promise<{ url: string }> {
@@ -132,9 +155,9 @@ export class Recordings {
     const response = await fetch(this.server.recordings(path, values), { method, body, cache: 'no-store' }).catch(() => null);
     if (response === null) throw new Refusal(0, '', '');
     if (response.status === 204) return undefined as Answer;
-    const answer = (await response.json().catch(() => ({}))) as Answer & { code?: string; error?: string };
+    const answer = (await response.json().catch(() => ({}))) as Answer & { code?: string; error?: string; advice?: Advice[] };
     if (response.ok) return answer;
-    throw new Refusal(response.status, answer.code ?? '', answer.error ?? `${response.status} ${response.statusText}`);
+    throw new Refusal(response.status, answer.code ?? '', answer.error ?? `${response.status} ${response.statusText}`, answer.advice);
   }
 }
 

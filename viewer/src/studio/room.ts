@@ -1,11 +1,11 @@
 import { every } from '../lifetime.ts';
 import { byId } from '../ui/elements.ts';
-import type { PageWords } from '../words/page-words.ts';
 import { isKey, say, type Key, type Sentence } from '../words/text.ts';
+import { showAdvice } from './advice.ts';
 import { Camera } from './camera.ts';
-import { item } from './items.ts';
-import { showMeters } from './meters.ts';
-import { type Overview, type Part, type Recordings, type Status, type Told, type Turns } from './recordings.ts';
+import { Bodies, type BodyPorts } from './bodies.ts';
+import { showMeters, soundsOf } from './meters.ts';
+import { type Overview, type Part, type Status, type Told, type Turns } from './recordings.ts';
 import { Sending } from './sending.ts';
 
 const LOOKED = 400; // ms between two pictures for guidance
@@ -15,15 +15,11 @@ const SLICE = 4 << 20; // bytes of a video that are sent at once
 const UPLOAD = 'upload';
 
 /** What the view of a person's recording needs of the page around it. */
-export interface RoomPorts {
-  words: PageWords;
-  recordings: Recordings;
-  /** Something is wrong, or nothing any more. */
-  problem(sentence: Sentence | null): void;
-  /** Shows an error. */
-  failed(error: unknown): void;
-  /** There is something new of the person. */
-  changed(status: Status): void;
+export interface RoomPorts extends BodyPorts {
+  /** A part is chosen. */
+  chosen(part: string): void;
+  /** Asks a question that is answered by yes or no. */
+  confirm(question: Sentence): boolean;
 }
 
 /** Where somebody records the parts, brings a video, and has the avatar made. */
@@ -31,6 +27,7 @@ export class Room {
   private readonly root: ParentNode;
   private readonly ports: RoomPorts;
   private readonly camera: Camera;
+  private readonly bodies: Bodies;
   private status: Status | null = null;
   private current = '';
   private sending: Sending | null = null;
@@ -42,6 +39,7 @@ export class Room {
     this.root = root;
     this.ports = ports;
     this.camera = new Camera(byId<HTMLVideoElement>(root, 'camera'), () => this.loseCamera());
+    this.bodies = new Bodies(root, ports);
     this.on('open', () => this.open());
     this.on('record', () => (this.camera.isRecording ? this.finish() : this.begin()));
     this.on('salvage', () => this.change((name, { id, take }) => ports.recordings.keep(name, id, take!)));
@@ -54,14 +52,17 @@ export class Room {
     byId<HTMLInputElement>(root, 'file').onchange = () => void this.upload().catch(ports.failed);
     byId<HTMLFormElement>(root, 'make').onsubmit = (event) => {
       event.preventDefault();
-      void this.make().catch(ports.failed);
+      this.make();
     };
+    byId<HTMLSelectElement>(root, 'quality').onchange = () => this.write();
     every(LOOKED, signal, () => void this.look().catch(() => {}));
     every(SHOWN, signal, () => this.showClock());
   }
 
   /** What the server can do. */
-  equip({ qualities, lacking }: Overview): void {
+  equip(overview: Overview): void {
+    const { qualities, lacking } = overview;
+    this.bodies.equip(overview);
     byId(this.root, 'lacking').hidden = lacking === '';
     const options = qualities.map((quality) => {
       const option = new Option(quality, quality, quality === 'good', quality === 'good');
@@ -71,14 +72,31 @@ export class Room {
     byId(this.root, 'quality').replaceChildren(...options);
   }
 
-  /** Shows a person, at the part that is to be recorded next. */
-  show(status: Status): void {
+  /**
+   * Shows a person, at the part that is to be recorded next.
+   *
+   * @param part that is shown instead, if it is one of those
+   */
+  show(status: Status, part: string | null): void {
     const other = status.name !== this.status?.name;
     this.status = status;
     byId(this.root, 'text').lang = status.language;
-    if (other && this.isBrought) this.current = UPLOAD;
-    else if (other || (this.current === UPLOAD && !this.isBrought)) this.current = this.next(status);
+    if (other) this.showFirst(status, part);
+    else if (this.current === UPLOAD && !this.isBrought) this.current = this.next(status);
+    this.bodies.show(status);
     this.write();
+  }
+
+  /** Whether the camera records, or a video is on its way. */
+  get isBusy(): boolean {
+    return this.sending !== null;
+  }
+
+  private showFirst(status: Status, part: string | null): void {
+    const { making } = status;
+    if (making) byId<HTMLSelectElement>(this.root, 'quality').value = making.quality;
+    const isThere = status.parts.some(({ id, state }) => id === part && (this.isAgreed || id === 'consent') && (id !== UPLOAD || state === 'kept'));
+    this.current = isThere ? part! : this.isBrought ? UPLOAD : this.next(status);
   }
 
   /** Leaves the person; the camera goes off, and of a part that is being recorded stays what was sent. */
@@ -173,6 +191,7 @@ export class Room {
     if (!file) return;
     const { words, recordings, problem, changed } = this.ports;
     const sending = new Sending(recordings, this.status!.name, UPLOAD, (lost) => problem(lost ? say('studio.lost') : null));
+    this.sending = sending;
     problem(null);
     arrived.hidden = false;
     try {
@@ -180,27 +199,36 @@ export class Room {
         words.write(arrived, say('studio.uploading', { n: Math.floor((100 * at) / file.size) }));
         await sending.add(file.slice(at, at + SLICE));
       }
-      words.write(arrived, say('studio.saving'));
+      words.write(arrived, say('studio.looking'));
       const status = await sending.keep();
       this.current = UPLOAD; // what is wrong with it is read at once
       changed(status);
     } finally {
       arrived.hidden = true;
+      if (this.sending === sending) this.sending = null;
     }
     this.reveal();
   }
 
-  private async make(): Promise<void> {
+  /** Has the avatar made; where a making was stopped or failed, from nothing. */
+  make(): void {
+    const anew = isOver(this.status!);
+    if (anew && !this.ports.confirm(say('studio.making.anew.sure'))) return;
     this.ports.problem(null);
-    const quality = byId<HTMLSelectElement>(this.root, 'quality').value;
-    const status = await this.ports.recordings.make(this.status!.name, quality);
-    this.camera.close();
-    this.ports.changed(status);
+    this.ports.recordings.make(this.status!.name, this.quality, anew).then((status) => {
+      this.camera.close();
+      this.ports.changed(status);
+    }, this.ports.failed);
+  }
+
+  private get quality(): string {
+    return byId<HTMLSelectElement>(this.root, 'quality').value;
   }
 
   private select(id: string): void {
     if (this.camera.isRecording) return;
     this.current = id;
+    this.ports.chosen(id);
     this.most = 0;
     this.hush();
     this.write();
@@ -246,6 +274,7 @@ export class Room {
     if (!this.camera.isRecording) return;
     const seconds = Math.floor((performance.now() - this.began) / 1000);
     this.ports.words.write(byId(this.root, 'clock'), say('studio.recording', { n: seconds }));
+    this.measure(seconds);
     if (seconds >= LONGEST) void this.finish().catch(this.ports.failed);
   }
 
@@ -266,16 +295,34 @@ export class Room {
     byId(root, 'salvage').hidden = camera.isRecording || part.state !== 'broken';
     byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || this.isComplete(status);
     byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
-    byId(root, 'advice').replaceChildren(...(part.advice ?? []).map(item));
+    showAdvice(byId(root, 'advice'), words, part.advice ?? []);
     byId(root, 'parts').replaceChildren(...status.parts.filter(isListed).map((one) => this.entry(one)));
-    showMeters(byId(root, 'meters'), words, status.covered);
+    this.measure(0);
+    words.write(byId(root, 'sounds'), soundsOf(status.covered));
     byId(root, 'covered').hidden = this.isBrought; // the parts do not count then
-    const ready = this.isReady(status);
-    byId<HTMLButtonElement>(root, 'go').disabled = !ready || camera.isRecording;
-    words.write(byId(root, 'first'), ready ? this.more(status) : say('studio.make.first'));
+    this.writeMake(status);
     byId<HTMLButtonElement>(root, 'upload').disabled = !this.isAgreed;
     if (!camera.isOpen) this.hush('studio.camera.off');
     byId(root, 'reached').hidden ||= !camera.isOpen;
+  }
+
+  /** Shows what is covered, with so many seconds of what is being recorded. */
+  private measure(seconds: number): void {
+    if (!this.status) return;
+    const now = this.camera.isRecording ? { part: this.current, seconds } : null;
+    showMeters(byId(this.root, 'meters'), this.ports.words, this.status, now);
+  }
+
+  /** Shows whether the avatar can be made, and what the button does. */
+  private writeMake(status: Status): void {
+    const { words } = this.ports;
+    const ready = this.isReady(status);
+    const { making } = status;
+    const isSame = making?.state === 'made' && making.changed.length === 0 && making.quality === this.quality;
+    const go = byId<HTMLButtonElement>(this.root, 'go');
+    go.disabled = !ready || isSame || this.camera.isRecording;
+    words.write(go, say(isOver(status) ? 'studio.making.anew' : making || status.avatar ? 'studio.make.again' : 'studio.make'));
+    words.write(byId(this.root, 'first'), isSame ? say('studio.make.same') : ready ? this.more(status) : say('studio.make.first'));
   }
 
   /** Whether the person said that they agree: that comes before all else. */
@@ -319,6 +366,11 @@ export class Room {
     row!.append(button!);
     return row as HTMLLIElement;
   }
+}
+
+/** Whether a making has ended without an avatar. */
+function isOver({ making }: Status): boolean {
+  return making?.state === 'stopped' || making?.state === 'failed';
 }
 
 /** Whether a part is listed: a video that was brought only if there is one. */

@@ -14,9 +14,9 @@ export interface Reference {
 }
 
 /** Writes a random bundle, or takes `bundle`, and evaluates it with Python. */
-export function makeReference(options: { bundle?: string; gaussians?: number; pictures?: string }): Reference {
+export function makeReference(options: { bundle?: string; gaussians?: number; pictures?: string; shoulders?: true }): Reference {
   const out = scratchFolder();
-  const args = Object.entries(options).flatMap(([name, value]) => [`--${name}`, String(value)]);
+  const args = Object.entries(options).flatMap(([name, value]) => (value === true ? [`--${name}`] : [`--${name}`, String(value)]));
   runPython('references/head_reference.py', out, ...args);
   const json = JSON.parse(readFileSync(join(out, 'reference.json'), 'utf8')) as Reference;
   return {

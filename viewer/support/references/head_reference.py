@@ -1,6 +1,6 @@
 """What Python makes of a bundle: the truth that the page is tested against.
 
-Run: python head_reference.py OUT [--bundle FILE] [--gaussians N] [--pictures WxH]
+Run: python head_reference.py OUT [--bundle FILE] [--gaussians N] [--pictures WxH] [--shoulders]
 
 Writes OUT/bundle/ (the bundle's files), OUT/reference.json (expressions and coefficients),
 OUT/attributes.f32 (E, N, 4: r, g, b, opacity) and, if asked, OUT/pictures.u8 (E, H, W, 3).
@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.bundle import evaluate
-from ico3d.bundle.format import Bundle
-from support.bundles.random_bundle import write_random_bundle
+from ico3d.bundle.format import Bundle, add_files
+from ico3d.bundle.shoulders import SHOULDERS
+from support.bundles.random_bundle import still_shoulders, write_random_bundle
 
 NUM_EXPRESSIONS = 5
 
@@ -45,12 +46,17 @@ def main() -> None:
     parser.add_argument("--bundle", type=Path)
     parser.add_argument("--gaussians", type=int, default=4000)
     parser.add_argument("--pictures", help="WxH")
+    parser.add_argument("--shoulders", action="store_true", help="which stay behind")
     arguments = parser.parse_args()
     out = arguments.out
     path = arguments.bundle or out / "random.ico3d"
     (out / "bundle").mkdir(parents=True, exist_ok=True)
     if arguments.bundle is None:
-        write_random_bundle(path, arguments.gaussians)
+        manifest = write_random_bundle(path, arguments.gaussians)
+        if arguments.shoulders:
+            head = Bundle.open(path).require_head()[0]
+            still = still_shoulders(head, manifest.head.num_poses)
+            add_files(path, {SHOULDERS: still.to_bytes()})
     bundle = Bundle.open(path)
     for name in bundle.names:
         (out / "bundle" / name).write_bytes(bundle.read(name))

@@ -24,9 +24,14 @@ export class ChatServer {
     return ChatServer.run(['studio', folder, '--port', String(port), '--no-browser', ...more]);
   }
 
-  private static async run(words: string[]): Promise<ChatServer> {
-    const args = ['-m', 'ico3d.cli', ...words];
-    const child = spawn(PYTHON, args, { cwd: REPOSITORY, env: ENVIRONMENT, stdio: ['ignore', 'pipe', 'inherit'] });
+  /** `ico3d studio` with a folder, whose files the system lets grow to so many bytes, as on a full disk. */
+  static limited(folder: string, bytes: number): Promise<ChatServer> {
+    return ChatServer.run(['studio', folder, '--port', '0', '--no-browser'], ['prlimit', `--fsize=${bytes}`]);
+  }
+
+  private static async run(words: string[], before: string[] = []): Promise<ChatServer> {
+    const [program, ...args] = [...before, PYTHON, '-m', 'ico3d.cli', ...words];
+    const child = spawn(program!, args, { cwd: REPOSITORY, env: ENVIRONMENT, stdio: ['ignore', 'pipe', 'inherit'] });
     return new ChatServer(child, await readUrl(child));
   }
 

@@ -109,6 +109,26 @@ describe('the rasteriser', () => {
     }
   });
 
+  test('moves the Gaussians of a head by their share of the motion of the shoulders', async () => {
+    const light = [3, 1, -1, 2];
+    const rows = (share: number) => Float32Array.of(0.3, -0.2, 2, 0.8, 0.1, 0.5, -0.3, 0.2, 0.05, 0.1, 0, ...light, share);
+    const [angle, shift] = [0.3, [0.2, -0.1, 0.4]];
+    const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
+    const motion = Float32Array.of(Math.cos(angle / 2), 0, 0, Math.sin(angle / 2), ...shift);
+    const still = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
+    const moved = Float32Array.of(cosine, -sine, 0, shift[0]!, sine, cosine, 0, shift[1]!, 0, 0, 1, shift[2]!);
+    const draw = async (share: number, view: Float32Array) => {
+      const one = new Rasteriser(await makeKernel());
+      one.put(0, { kind: 'head', count: 1, rows: rows(share).buffer as ArrayBuffer, sizes: [0] });
+      const placed = [{ id: 0, view, drawn: 1, values: motion }];
+      return one.draw({ lens: [100, 100, 100, 75], width: WIDTH, height: HEIGHT, band: [0, COLUMNS], placed }, background).slice();
+    };
+    const expected = await draw(0, moved);
+    expect(worst(await draw(1, still), expected)).toBeLessThanOrEqual(1);
+    expect(worst(await draw(0, still), expected)).toBeGreaterThan(30);
+    expect(worst(await draw(0.5, still), expected)).toBeGreaterThan(30);
+  });
+
   test('draws where the background changed anew, and nothing else', async () => {
     const [keeping, fresh] = [new Rasteriser(await makeKernel()), new Rasteriser(await makeKernel())];
     for (const one of [keeping, fresh]) one.put(0, reference.source);

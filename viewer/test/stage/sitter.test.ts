@@ -54,7 +54,7 @@ describe('the eyes of a head', () => {
 describe('who sits before the camera', () => {
   const rigid = (x: number, y: number, turn: number) => new Matrix4().makeRotationY(turn).setPosition(x, y, 0.1).transpose().toArray();
   const poses = Float32Array.from([...rigid(-0.1, 1.5, -0.2), ...rigid(0.1, 1.5, 0.2)]);
-  const files: HeadFiles = { info, baked: makeHead(), poses };
+  const files: HeadFiles = { info, baked: makeHead(), poses, shoulders: null };
   const camera = { eye: [0.5, 1.2, 3], target: [0, 0.8, 0], up: [0, 2, 0], fov_y: 30 };
   const body = { low: [-0.4, 0.02, -0.2], high: [0.4, 1.55, 0.5], windows: [{ last: 1 }] };
   const whole = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1]);
@@ -86,7 +86,7 @@ describe('who sits before the camera', () => {
   test('strays do not count', () => {
     const strayed = makeHead();
     strayed.means.set([0, 9, -9], 0);
-    const sitter = sitterOf({ camera, body: null } as unknown as Manifest, { info, baked: strayed, poses }, [0]);
+    const sitter = sitterOf({ camera, body: null } as unknown as Manifest, { info, baked: strayed, poses, shoulders: null }, [0]);
     expect(sitter.crown).toBeCloseTo(0.11 - EYES.y, 2);
     expect(sitter.box.max.y).toBeLessThan(1.65);
   });

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from ico3d.avatar import staging
 from ico3d.avatar.baking import head_cost
@@ -20,11 +21,14 @@ from ico3d.bundle.manifest import (
     Manifest,
     SpeechInfo,
 )
+from ico3d.bundle.shoulders import SHOULDERS, BakedShoulders
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.model_folder import TrainedHead
+from ico3d.head.shoulders import shoulders_of
+from ico3d.head.views import PictureCache
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
@@ -144,7 +148,8 @@ def write(
     Raises:
         BundleError: If the bundle fails a check.
     """
-    poses = staging.idle_motion(capture)
+    motion = staging.idle_motion(capture)
+    poses = motion.poses
     frontal = staging.frontal_camera(capture)
     idle = idle_expression(head, samples.expressions)
     baked = driven(result.head, head)
@@ -158,6 +163,8 @@ def write(
         POSES: poses_to_bytes(poses),
         THUMBNAIL: staging.thumbnail(seen.transform(middle), camera, background),
     }
+    if (shoulders := _shoulders(baked, head, capture, motion)) is not None:
+        files[SHOULDERS] = shoulders.to_bytes()
     speech = None
     if head.adaptor is not None:
         files[SPEECH], speech = speech_file(head.adaptor, head.encoder)
@@ -175,6 +182,20 @@ def write(
         provenance=about.provenance,
     )
     return write_bundle(out, *coarse_first(manifest, files))
+
+
+def _shoulders(
+    baked: BakedHead, head: TrainedHead, capture: Capture, motion: staging.IdleMotion
+) -> BakedShoulders | None:
+    """How the shoulders of a portrait stand while its head sways; None where they follow it."""
+    neck = head.model.shape.neck
+    seen = shoulders_of(capture, neck, PictureCache(capture, 0))
+    if neck is None or seen is None:
+        return None
+    share = neck.follows(torch.from_numpy(baked.means.copy())).numpy()  # (N,)
+    frames = range(motion.first, motion.first + len(motion.poses))
+    places = staging.smoothed(np.stack([seen.place(frame) for frame in frames]))  # (F, 4, 4)
+    return BakedShoulders(np.round(255 * share).astype(np.uint8), places.astype(np.float32))
 
 
 def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
 """What baking costs a head: PSNR of exact and baked head, to recorded pictures and each other."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -17,6 +18,7 @@ from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.model_folder import TrainedHead
+from ico3d.head.shoulders import shoulders_of
 from ico3d.head.views import PictureCache, View, staged
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
@@ -26,6 +28,12 @@ MAX_DROP = 0.3
 MIN_LIKENESS = 45.0
 """Least PSNR in dB of baked to exact pictures."""
 _CPU = torch.device("cpu")
+
+Posed = Callable[[Gaussians], Gaussians]
+
+
+def _as_they_are(gaussians: Gaussians) -> Gaussians:
+    return gaussians
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,7 @@ class Reference:
         background: (3,) or (H, W, 3) colour behind the head, on the device that draws.
         exact: (H, W, 3) float16 picture of the exact head.
         truth: (H, W, 3) float16 recorded picture; None where nothing was recorded.
+        posed: Puts the shoulders of a portrait where they were.
     """
 
     camera: Camera
@@ -45,6 +54,7 @@ class Reference:
     background: torch.Tensor
     exact: np.ndarray
     truth: np.ndarray | None = None
+    posed: Posed = _as_they_are
 
 
 def references(
@@ -65,15 +75,18 @@ def references(
     shown = PartOfCapture(capture, cameras, frames)
     pictures = PictureCache(HeadOverTorso(shown) if head.over_torso else shown, 0.0)
     track = head.track(capture)
+    shoulders = shoulders_of(shown, head.model.shape.neck, pictures)
     chosen = [frames[i] for i in spread(len(frames), count)]
     views = pictures.views(chosen)[: 4 * count]
     if not views:
         raise CaptureError(f"{capture.path}: there is no test picture to measure baking with.")
-    with torch.no_grad():
-        return [
-            _reference(head, pictures, view, track.at(view.frame), neutral)
-            for view in (views[i] for i in spread(len(views), count))
-        ]
+    found = []
+    for view in (views[i] for i in spread(len(views), count)):
+        posed = partial(shoulders.posed, frame=view.frame) if shoulders else _as_they_are
+        with torch.no_grad():
+            expression = track.at(view.frame)
+        found.append(_reference(head, pictures, view, expression, neutral, posed))
+    return found
 
 
 def measure(head: BakedHead, views: list[Reference]) -> Loss:
@@ -125,7 +138,8 @@ def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
 
 def baked_picture(head: BakedHead, view: Reference) -> np.ndarray:
     """The baked head as the reference's camera sees it: (H, W, 3) float32."""
-    return _picture(baked_gaussians(head, view.expression), view.camera, view.background)
+    gaussians = view.posed(baked_gaussians(head, view.expression))
+    return _picture(gaussians, view.camera, view.background)
 
 
 def _reference(
@@ -134,12 +148,14 @@ def _reference(
     view: View,
     expression: torch.Tensor,
     neutral: tuple[float, float, float],
+    posed: Posed,
 ) -> Reference:
     """The reference of a recorded view; `neutral` replaces a background that is not known."""
     picture = pictures.picture(view, _CPU)
     plate = pictures.background(view, _CPU)
     behind, truth = staged(picture, plate, torch.tensor(neutral))
-    return reference(head, view.camera, expression, behind, truth.numpy().astype(np.float16))
+    seen = truth.numpy().astype(np.float16)
+    return reference(head, view.camera, expression, behind, seen, posed)
 
 
 def reference(
@@ -148,6 +164,7 @@ def reference(
     expression: torch.Tensor,
     background: torch.Tensor,
     truth: np.ndarray | None = None,
+    posed: Posed = _as_they_are,
 ) -> Reference:
     """A reference with the picture of the exact head, drawn on the device of the head.
 
@@ -157,11 +174,13 @@ def reference(
         expression: (B,) float32.
         background: (3,) or (H, W, 3) colour behind the head.
         truth: (H, W, 3) recorded picture, if there is one.
+        posed: Puts the shoulders of a portrait where they were.
     """
     background = background.to(head.model.device)
     with torch.no_grad():
-        exact = _picture(head.model(expression), camera, background).astype(np.float16)
-    return Reference(camera, expression.numpy(), background, exact, truth)
+        gaussians = posed(head.model(expression))
+        exact = _picture(gaussians, camera, background).astype(np.float16)
+    return Reference(camera, expression.numpy(), background, exact, truth, posed)
 
 
 def _picture(gaussians: Gaussians, camera: Camera, background: torch.Tensor) -> np.ndarray:

@@ -14,9 +14,8 @@ from ico3d.avatar.poseable import Poseable, poseable_of
 from ico3d.avatar.render_bundle import (
     BakedAvatar,
     backdrop_gaussians,
-    baked_gaussians,
     body_gaussians,
-    pose_at,
+    swaying_head,
 )
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.format import SPEECH, Bundle
@@ -109,14 +108,13 @@ def bundle_actor(bundle: Bundle) -> Actor:
 
 def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
     """Draws a head alone, which plays its recorded motion back and forth; with its length in s."""
-    head, poses = bundle.require_head()
+    _, poses = bundle.require_head()
     assert bundle.manifest.head is not None
     fps = bundle.manifest.head.fps
     seconds = (len(poses) - 1) / fps
 
     def draw(at: float, expression: np.ndarray) -> Gaussians:
-        pose = pose_at(poses, back_and_forth(at, seconds) * fps)
-        return baked_gaussians(head, expression).transform(pose)
+        return swaying_head(bundle, expression, back_and_forth(at, seconds) * fps)
 
     return draw, seconds
 

@@ -1,28 +1,15 @@
 """What is wrong with a video, in words for the person who filmed it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
-Topic = Literal[
-    "file",
-    "length",
-    "face",
-    "faces",
-    "frame",
-    "distance",
-    "light",
-    "exposure",
-    "blur",
-    "hands",
-    "turns",
-    "lips",
-    "camera",
-    "rate",
-    "sound",
-]
+from ico3d.creating.looking.texts import TEXTS
+
 Level = Literal["refused", "better"]
 """Whether nothing can be made of the video, or something better could."""
+Values = Mapping[str, float | str]
+"""What stands in a text, by its name there."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +17,26 @@ class Advice:
     """One thing that would make a video better.
 
     Attributes:
-        topic: What it is about.
+        code: Name of the text in `TEXTS`, by which a page finds it in its own languages.
         level: `refused` if nothing can be made of the video as it is.
-        text: What is wrong and what helps, in plain words.
+        values: What stands in the text.
         spans: Seconds (first, last) where it is so; none where it is so all along.
     """
 
-    topic: Topic
-    level: Level
-    text: str
+    code: str
+    level: Level = "better"
+    values: Values = field(default_factory=dict)
     spans: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def topic(self) -> str:
+        """What it is about."""
+        return self.code.partition("-")[0]
+
+    @property
+    def text(self) -> str:
+        """What is wrong and what helps, in plain English."""
+        return TEXTS[self.code].format(**self.values)
 
     def __str__(self) -> str:
         """The text with the seconds before it."""

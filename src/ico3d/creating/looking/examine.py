@@ -101,23 +101,14 @@ def _rate(video: Video) -> float:
 def _of_file(video: Video, seconds: float) -> Iterator[Advice]:
     """Length, rate, gaps and damage."""
     if seconds < LEAST_SECONDS:
-        yield Advice("length", "refused", (
-            f"the video lasts {seconds:.1f} s: film half a minute or more of talking."
-        ))  # fmt: skip
+        yield Advice("length-short", "refused", {"seconds": round(seconds, 1)})
     elif seconds < FEW_SECONDS:
-        yield Advice("length", "better", (
-            f"the video lasts {seconds:.0f} s: half a minute or more shows more sounds and sides."
-        ))  # fmt: skip
+        yield Advice("length-few", "better", {"seconds": round(seconds)})
     if (rate := _rate(video)) < SLOW:
-        yield Advice("rate", "better", (
-            f"there are {rate:.0f} pictures per second: give more light, or choose 25 or 30 in the "
-            "camera's settings."
-        ))  # fmt: skip
+        yield Advice("rate-slow", "better", {"n": round(rate)})
     gaps = np.flatnonzero(np.diff(video.times) > GAP)
     if len(gaps):
-        text = "the picture stands still: close other programs while filming."
-        yield Advice("rate", "better", text, spans_of([video.times[i] for i in gaps], 1.0))
+        spans = spans_of([video.times[i] for i in gaps], 1.0)
+        yield Advice("rate-gaps", "better", {}, spans)
     if video.damaged:
-        yield Advice("file", "better", (
-            f"the file is damaged: {video.damaged} parts of it cannot be read; copy it again."
-        ))  # fmt: skip
+        yield Advice("file", "better", {"n": video.damaged})

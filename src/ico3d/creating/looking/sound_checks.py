@@ -26,30 +26,20 @@ def sound_advice(sound: Sound | None) -> Iterator[Advice]:
     length = 0 if sound is None else round(WINDOW * sound.rate)
     count = 0 if sound is None else len(sound.samples) // length
     if sound is None or not count:
-        yield Advice("sound", "refused", (
-            "the video has no sound, by which an avatar learns how your lips follow your voice: "
-            "film again with the microphone on."
-        ))  # fmt: skip
+        yield Advice("sound-none", "refused")
         return
     pieces = sound.samples[: count * length].reshape(count, length)  # (P, n)
     loud, floor = np.quantile(loudness(pieces), [0.9, 0.1])
     if loud < SILENT:
-        yield Advice("sound", "refused", (
-            "the sound is silent, and an avatar learns from it how your lips follow your voice: "
-            "switch the microphone on and film again."
-        ))  # fmt: skip
+        yield Advice("sound-silent", "refused")
         return
     clipped = [WINDOW * (place + 0.5) for place in np.flatnonzero(clips(pieces))]
     if clipped:
-        text = "the sound is clipped: speak softer, or move away from the microphone."
-        yield Advice("sound", "better", text, spans_of(clipped, 1.0))
+        yield Advice("sound-clipped", "better", {}, spans_of(clipped, 1.0))
     if loud < QUIET:
-        yield Advice("sound", "better", "the voice is quiet: speak up, or come closer.")
+        yield Advice("sound-quiet")
     if loud - floor < ABOVE_NOISE:
-        yield Advice("sound", "better", (
-            "noise is nearly as loud as the voice, or there is no pause: find a quiet room, and "
-            "be silent for a moment between sentences."
-        ))  # fmt: skip
+        yield Advice("sound-noise")
 
 
 def loudness(pieces: np.ndarray) -> np.ndarray:

@@ -10,15 +10,17 @@ from PIL import Image, UnidentifiedImageError
 
 from ico3d.capture.face.mediapipe_face import FaceReader
 from ico3d.capture.video import MOST_PIXELS, open_video, opened, read_sound
+from ico3d.common.typed import plain
 from ico3d.common.weights import model_file
 from ico3d.creating.looking.advice import Advice
+from ico3d.creating.looking.examine import examine
 from ico3d.creating.looking.picture_checks import picture_advice
 from ico3d.creating.looking.samples import Samples, sample_of, sharpness_of
 from ico3d.creating.looking.sound_checks import sound_advice
 from ico3d.errors import CaptureError, Ico3dError, MissingExtraError, MissingModelError
 from ico3d.recording.guiding.guide import GOALS, Told, extremes, instruct, without_faces
 from ico3d.recording.keeping.plan import CONSENT, TURNS, UPLOAD, Turn
-from ico3d.recording.refusals import Refused, no_video
+from ico3d.recording.refusals import Refused, no_video, unusable
 
 SIDE = 512
 """Upper limit of the short side of parts that are looked at, in pixels, as `ico3d create` has."""
@@ -80,19 +82,37 @@ class Eye:
 
         Returns:
             `seconds`; `turn`, degrees (least to the left, most, least up, most), None where no face
-            was looked for or found; `advice`, sentences.
+            was looked for or found; `advice`, what would make it better.
 
         Raises:
-            Refused: If it is no video, or a consent in which nothing is heard.
+            Refused: If it is no video, a consent in which nothing is heard, or a whole video of
+                which no avatar can be made.
         """
         from av.error import FFmpegError
 
         try:
-            return _of_consent(file) if id == CONSENT else self._found(file, id)
+            if id == CONSENT:
+                return _of_consent(file)
+            return self._brought(file) if id == UPLOAD else self._found(file, id)
         except Refused:
             raise
         except (Ico3dError, FFmpegError, OSError, ValueError) as error:
             raise no_video() from error
+
+    def _brought(self, file: Path) -> dict[str, Any]:
+        """What is found in a whole video: all that `ico3d create` would look at."""
+        if self._faces is None:
+            report = self._found(file, UPLOAD)
+            refused = [one for one in sound_advice(read_sound(file)) if one.level == "refused"]
+            if refused:
+                raise unusable(refused)
+            return report
+        _check_size(file)
+        found = examine(file, SIDE, lambda _: None)
+        if found.refused:
+            raise unusable(found.refused)
+        seconds = round(found.seconds, 2)
+        return {"seconds": seconds, "turn": None, "advice": [plain(one) for one in found.advice]}
 
     def _found(self, file: Path, id: str) -> dict[str, Any]:
         _check_size(file)
@@ -112,10 +132,9 @@ class Eye:
                 turn = [round(float(v), 1) for v in (low[0], high[0], low[1], high[1])]
         if video.decoded < 2:
             raise CaptureError(f"{file} is a picture.")
-        left_out = () if id == UPLOAD else OF_A_WHOLE
-        said = [str(one) for one in (*seen, *heard) if one.topic not in left_out]
-        said += short_of(id, turn)
-        return {"seconds": round(video.times[-1], 2), "turn": turn, "advice": said}
+        said = [one for one in (*seen, *heard) if one.topic not in OF_A_WHOLE]
+        told = [plain(one) for one in (*said, *short_of(id, turn))]
+        return {"seconds": round(video.times[-1], 2), "turn": turn, "advice": told}
 
     def _samples(self, video: Any) -> Samples:
         found = []
@@ -144,14 +163,13 @@ def _check_size(file: Path) -> None:
         raise Refused("large", "the pictures of this video are larger than is taken.", 413)
 
 
-def short_of(id: str, turn: list[float] | None) -> list[str]:
+def short_of(id: str, turn: list[float] | None) -> list[Advice]:
     """What is said of a turn of the head that did not go far enough; nothing of any other part."""
     way = turn_of(id)
     if way is None or turn is None or (share := extremes(turn)[way]) >= 1:
         return []
     goal = GOALS[way]
-    where = {"left": "to the left", "right": "to the right", "up": "up", "down": "down"}[way]
-    return [f"the head was turned {where} by {share * goal:.0f}°: {goal:.0f}° shows enough of it."]
+    return [Advice(f"short-{way}", "better", {"n": round(share * goal), "goal": round(goal)})]
 
 
 def _of_consent(file: Path) -> dict[str, Any]:

@@ -154,7 +154,7 @@ class Person:
             self._state(TICKED, TICKED_AND_SPOKEN)
 
     def discard(self, id: str, take: str) -> None:
-        """Removes a take that shows nothing."""
+        """Removes a take of which nothing can be made."""
         self._take(id, take).unlink(missing_ok=True)
 
     def remove(self, id: str) -> None:

@@ -1,24 +1,69 @@
 """Starts and stops the processes that make avatars."""
 
 import contextlib
+import shutil
 import subprocess
 import threading
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
-from ico3d.avatar.embodying.look import UNCHANGED, Look
+from ico3d.bundle.packaged import NAME
 from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.errors import StorageError
+from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import Person
-from ico3d.recording.keeping.plan import CONSENT
 from ico3d.recording.making.beside import start, stop
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, begun, read_progress, write_progress
+from ico3d.recording.making.sources import signature, sources
 from ico3d.recording.refusals import Refused
 
 WORKER = "ico3d.recording.making.worker"
 LOG = "log.txt"
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The bodies that avatars may get.
+
+    Attributes:
+        body: A whole person, whose body stands in.
+        default: What counts for those who chose nothing.
+    """
+
+    body: Path = Path(NAME)
+    default: BodyChoice = HEAD_ALONE
+
+    @property
+    def is_packaged(self) -> bool:
+        """Whether the body is that of the packaged avatar."""
+        return self.body == Path(NAME)
+
+    def choice(self, person: Person) -> BodyChoice:
+        """What was chosen for somebody."""
+        return read_choice(person.folder, self.default)
+
+    def check(self, choice: BodyChoice) -> None:
+        """Refuses a look that the body cannot have; that of the package has all of them.
+
+        Raises:
+            BundleError: If it cannot look so; the sentence says why.
+        """
+        if choice.wanted and not self.is_packaged:
+            from ico3d.avatar.embodying.embody import body_in
+            from ico3d.bundle.format import Bundle
+
+            body_in(Bundle.open(self.body), choice.look)
+
+    def words(self, person: Person) -> list[str]:
+        """Body, build and outfit for the process that makes; none for a head alone."""
+        choice = self.choice(person)
+        return [str(self.body), choice.look.build, choice.look.outfit] if choice.wanted else []
+
+
+PACKAGED = Bodies()
 
 
 class Makers:
@@ -27,25 +72,27 @@ class Makers:
     def __init__(
         self,
         people: People,
-        body: Path | None = None,
-        look: Look = UNCHANGED,
+        bodies: Bodies = PACKAGED,
         worker: str = WORKER,
     ):
         """Makes avatars of people by processes of their own.
 
         Args:
             people: Whose.
-            body: A whole person whose body they get; None makes heads alone.
-            look: Build and outfit of that body.
+            bodies: Which bodies they may get.
             worker: The module of the processes.
         """
-        self._people, self._worker = people, worker
-        self._on = [] if body is None else [str(body), look.build, look.outfit]
+        self._people, self._bodies, self._worker = people, bodies, worker
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._lock = threading.Lock()
 
-    def begin(self, person: Person, quality: str) -> None:
+    def begin(self, person: Person, quality: str, anew: bool = False) -> None:
         """Begins to make an avatar, or goes on with it.
+
+        Args:
+            person: Whose.
+            quality: How well it is to be made.
+            anew: Whether what was made so far is removed first.
 
         Raises:
             Refused: If the consent was not spoken, nothing is recorded, the quality is unknown, or
@@ -54,7 +101,7 @@ class Makers:
         if quality not in QUALITIES:
             raise Refused("quality", f"there is no quality {quality[:20]!r}.")
         person.check_spoken()
-        if not {part.id for part in person.parts() if part.report is not None} - {CONSENT}:
+        if not sources(person):
             said = "nothing is recorded: record some parts, or choose a video."
             raise Refused("nothing", said, 409)
         with self._lock:
@@ -62,10 +109,13 @@ class Makers:
             if busy:
                 raise Refused("busy", f"an avatar of {busy[0]} is being made: wait for it.", 409)
             folder = Places(person.folder).folder
+            if anew:
+                shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir(exist_ok=True)
-            write_progress(folder, begun(folder, cast(QualityName, quality)))
+            of = self._made_of(person)
+            write_progress(folder, begun(folder, cast(QualityName, quality), of))
             with (folder / LOG).open("ab") as log:
-                words = [str(person.folder), quality, *self._on]
+                words = [str(person.folder), quality, *of["on"]]
                 self._running[person.name] = start(self._worker, words, log)
 
     def progress(self, person: Person) -> Progress | None:
@@ -78,7 +128,7 @@ class Makers:
         if found is None or found.state != "running" or (process is not None and ended is None):
             return found
         why = "the making has ended unexpectedly: begin again, it goes on where it was."
-        failed = Progress("failed", found.quality, found.step, found.share, error=why)
+        failed = replace(found, state="failed", left=None, error=why)
         with contextlib.suppress(StorageError):  # that may be why
             write_progress(folder, failed)
         return failed
@@ -92,7 +142,21 @@ class Makers:
         folder = Places(person.folder).folder
         found = read_progress(folder)
         if found is not None and found.state == "running":
-            write_progress(folder, Progress("stopped", found.quality, found.step, found.share))
+            write_progress(folder, replace(found, state="stopped", left=None))
+
+    def discard(self, person: Person) -> None:
+        """Removes what was made so far; recordings and a finished avatar stay."""
+        self.stop(person)
+        shutil.rmtree(Places(person.folder).folder, ignore_errors=True)
+
+    def changed(self, person: Person, progress: Progress) -> list[str]:
+        """What is another since a making began: `parts`, `on` (the body), both or nothing."""
+        now = self._made_of(person)
+        return [name for name in now if progress.made_of.get(name) != now[name]]
+
+    def _made_of(self, person: Person) -> dict[str, Any]:
+        """What tells the recording and the body that was chosen from others."""
+        return {"parts": signature(sources(person)), "on": self._bodies.words(person)}
 
     def go_on(self) -> None:
         """Goes on with what was being made when the server ended."""

@@ -2,27 +2,19 @@
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from PIL import Image
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import plain
-from ico3d.creating.events import (
-    STEPS,
-    Advanced,
-    Event,
-    Looked,
-    Made,
-    Planned,
-    Preview,
-    Step,
-    Voiced,
-)
+from ico3d.creating.events import Advanced, Event, Looked, Made, Planned, Preview, Step, Voiced
+from ico3d.creating.looking.advice import Advice, Level
 from ico3d.creating.settings import QualityName
+from ico3d.recording.making.estimate import Estimate
 
 FILE, FACE = "progress.json", "face.jpg"
 State = Literal["running", "stopped", "failed", "made"]
@@ -40,10 +32,12 @@ class Progress:
         step: What is being done; `join` before the steps of `ico3d create`.
         share: How much of that is done, 0 to 1.
         left: Expected seconds of all that is left but baking; None where nobody knows yet.
-        advice: What would make it better.
+        advice: What would make it better, each as `plain` writes an `Advice`.
+        refused: Why nothing can be made of the video, likewise; empty where something can.
         faces: Number of pictures of the face that have been shown.
         error: Why it failed; empty where it did not.
         decibels: How good it is on pictures that it never saw; None where that is not known.
+        made_of: What tells the recording and the body of which it is made from others.
     """
 
     state: State
@@ -51,25 +45,35 @@ class Progress:
     step: Step | Literal["join"] = "join"
     share: float = 0.0
     left: float | None = None
-    advice: tuple[str, ...] = ()
+    advice: tuple[dict[str, Any], ...] = ()
+    refused: tuple[dict[str, Any], ...] = ()
     faces: int = 0
     error: str = ""
     decibels: float | None = None
+    made_of: dict[str, Any] = field(default_factory=dict)
 
 
 def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""
     try:
         values = json.loads((folder / FILE).read_text("utf-8"))
-        return Progress(**(values | {"advice": tuple(values["advice"])}))
+        found = Progress(**values)
+        return replace(found, advice=tuple(found.advice), refused=tuple(found.refused))
     except (OSError, ValueError, TypeError, KeyError):
         return None
 
 
-def begun(folder: Path, quality: QualityName) -> Progress:
-    """The progress of a making that begins, or goes on: with the pictures that there are."""
-    before = read_progress(folder)
-    return Progress("running", quality, faces=0 if before is None else before.faces)
+def begun(folder: Path, quality: QualityName, made_of: dict[str, Any] | None = None) -> Progress:
+    """The progress of a making that begins, or goes on: with the pictures that there are.
+
+    Args:
+        folder: Where it is kept.
+        quality: How well the avatar is made.
+        made_of: Of which recording and body; None for those that are noted there.
+    """
+    before = read_progress(folder) or Progress("running", quality)
+    of = before.made_of if made_of is None else made_of
+    return Progress("running", quality, faces=before.faces, made_of=of)
 
 
 def write_progress(folder: Path, progress: Progress) -> None:
@@ -94,20 +98,20 @@ class Reporter:
     folder: Path
     progress: Progress
     now: Callable[[], float] = time.monotonic
-    _plan: dict[Step, float] = field(default_factory=dict)
+    _estimate: Estimate | None = None
     _written: float = float("-inf")
 
     def __call__(self, event: Event) -> None:
         """Takes an event of `create`."""
         if isinstance(event, Looked):
-            better = tuple(str(one) for one in event.found.advice if one.level == "better")
-            self.change(advice=better)
+            found = event.found.advice
+            self.change(advice=_of(found, "better"), refused=_of(found, "refused"))
         elif isinstance(event, Voiced) and event.why:
-            without = f"The avatar is made without a voice of its own: {event.why}"
+            without = plain(Advice("voice", values={"why": event.why}))
             self.change(advice=(*self.progress.advice, without))
         elif isinstance(event, Planned):
-            self._plan = dict(event.seconds)
-            self.change(left=sum(self._plan.values()))
+            self._estimate = Estimate(event.seconds)
+            self.change(left=sum(event.seconds.values()))
         elif isinstance(event, Advanced):
             self._advance(event.step, event.share)
         elif isinstance(event, Preview):
@@ -127,9 +131,10 @@ class Reporter:
         """Notes how much of a step is done; of a step that goes on only now and then."""
         if step == self.progress.step and share < 1 and self.now() - self._written < OFTEN:
             return
-        left = None
-        if self._plan:
-            later = STEPS[STEPS.index(step) + 1 :]
-            now = self._plan.get(step, 0.0) * (1 - share)
-            left = round(now + sum(self._plan.get(one, 0.0) for one in later), 1)
+        left = self._estimate and round(self._estimate.left(step, share, self.now()), 1)
         self.change(step=step, share=round(share, 4), left=left)
+
+
+def _of(advice: Sequence[Advice], level: Level) -> tuple[dict[str, Any], ...]:
+    """The advice of one level, as it is kept."""
+    return tuple(plain(one) for one in advice if one.level == level)

@@ -16,11 +16,12 @@ from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError
 from ico3d.recording.keeping.person import VOICE_CONSENT, Person
-from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
+from ico3d.recording.keeping.plan import UPLOAD
 from ico3d.recording.making.beside import end_with_parent
 from ico3d.recording.making.joining import join
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun
+from ico3d.recording.making.sources import signature, sources
 
 
 def make(
@@ -73,13 +74,11 @@ def _short(sentence: str, folder: Path) -> str:
 
 def _video(person: Person, places: Places) -> Path:
     """The video that was brought, or the parts as one; what was made of another one is cleared."""
-    parts = {part.id: part.file for part in person.parts() if part.report is not None}
-    ids = [UPLOAD] if UPLOAD in parts else part_ids(person.consent()["language"])
-    files = [parts[id] for id in ids if id in parts and id != CONSENT]
+    files = sources(person)
     if not files:
         raise CaptureError("there is no recording: record some parts, or choose a video.")
-    now = [[file.name, file.stat().st_size, file.stat().st_mtime] for file in files]
-    video = files[0] if UPLOAD in parts else places.joined
+    now = signature(files)
+    video = files[0] if files[0].stem == UPLOAD else places.joined
     if _before(places) != now or not video.is_file():
         shutil.rmtree(places.work, ignore_errors=True)
         places.made.unlink(missing_ok=True)

@@ -39,16 +39,74 @@ export function addStill(view: usize, rows: usize, count: i32): void {
   }
 }
 
-/** A head: logits = mean + scale · Σ c·U; colour, opacity = sigmoid(logits). `values` are the coefficients. */
+// Where the Gaussian of a head that was bent last is, and how it is turned.
+let atX: f32 = 0;
+let atY: f32 = 0;
+let atZ: f32 = 0;
+let turnW: f32 = 1;
+let turnX: f32 = 0;
+let turnY: f32 = 0;
+let turnZ: f32 = 0;
+
+/** Moves a Gaussian of a head by its share of the shoulders' motion. */
+function bend(at: usize, motion: usize, share: f32): void {
+  const w = load<f32>(motion);
+  const i = load<f32>(motion, 4);
+  const j = load<f32>(motion, 8);
+  const k = load<f32>(motion, 12);
+  const x = load<f32>(at);
+  const y = load<f32>(at, 4);
+  const z = load<f32>(at, 8);
+  const ax = j * z - k * y + w * x;
+  const ay = k * x - i * z + w * y;
+  const az = i * y - j * x + w * z;
+  atX = x + share * (TWO * (j * az - k * ay) + load<f32>(motion, 16));
+  atY = y + share * (TWO * (k * ax - i * az) + load<f32>(motion, 20));
+  atZ = z + share * (TWO * (i * ay - j * ax) + load<f32>(motion, 24));
+  const bw = ONE + share * (w - ONE);
+  const bx = share * i;
+  const by = share * j;
+  const bz = share * k;
+  const qw = load<f32>(at, 12);
+  const qx = load<f32>(at, 16);
+  const qy = load<f32>(at, 20);
+  const qz = load<f32>(at, 24);
+  turnW = bw * qw - bx * qx - by * qy - bz * qz;
+  turnX = bw * qx + bx * qw + by * qz - bz * qy;
+  turnY = bw * qy - bx * qz + by * qw + bz * qx;
+  turnZ = bw * qz + bx * qy - by * qx + bz * qw;
+}
+
+/** Takes a Gaussian of a head as it is. */
+// @ts-ignore: decorator
+@inline
+function take(at: usize): void {
+  atX = load<f32>(at, 0);
+  atY = load<f32>(at, 4);
+  atZ = load<f32>(at, 8);
+  turnW = load<f32>(at, 12);
+  turnX = load<f32>(at, 16);
+  turnY = load<f32>(at, 20);
+  turnZ = load<f32>(at, 24);
+}
+
+/**
+ * A head: logits = mean + scale · Σ c·U; colour, opacity = sigmoid(logits). `values` are the
+ * coefficients, and the motion of the shoulders.
+ */
 export function addHead(view: usize, rows: usize, count: i32, values: usize, rank: i32): void {
   const stride = HEAD + 4 * <usize>rank;
+  const motion = values + 4 * <usize>rank;
   const end = rows + stride * <usize>count;
   const fading = rows + stride * <usize>min(late, count);
   for (let at = rows; at < end; at += stride) {
     const s0 = load<f32>(at, 28);
     const s1 = load<f32>(at, 32);
     const s2 = load<f32>(at, 36);
-    if (!approach(view, load<f32>(at, 0), load<f32>(at, 4), load<f32>(at, 8), max(s0, max(s1, s2)))) continue;
+    const share = load<f32>(at, 60);
+    if (share > 0) bend(at, motion, share);
+    else take(at);
+    if (!approach(view, atX, atY, atZ, max(s0, max(s1, s2)))) continue;
     let blend = f32x4.splat(0);
     for (let k: usize = 0; k < <usize>rank; k++) {
       const bytes = i16x8.extend_low_i8x16_s(v128.load32_zero(at + HEAD + (k << 2)));
@@ -57,7 +115,7 @@ export function addHead(view: usize, rows: usize, count: i32, values: usize, ran
     }
     const light = sigmoid(f32x4.add(v128.load(at, 44), f32x4.mul(v128.load32_splat(at, 40), blend)));
     const opacity: f32 = f32x4.extract_lane(light, 3) * (at < fading ? ONE : lateShare);
-    const record = splat(view, load<f32>(at, 12), load<f32>(at, 16), load<f32>(at, 20), load<f32>(at, 24), s0, s1, s2, opacity);
+    const record = splat(view, turnW, turnX, turnY, turnZ, s0, s1, s2, opacity);
     if (record) colour(record, light);
   }
 }

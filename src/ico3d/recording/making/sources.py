@@ -1,0 +1,19 @@
+"""Of which files of a recording an avatar is made."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
+
+
+def sources(person: Person) -> list[Path]:
+    """The video that was brought, or the parts in their order; none where nothing is recorded."""
+    parts = {part.id: part.file for part in person.parts() if part.report is not None}
+    ids = [UPLOAD] if UPLOAD in parts else part_ids(person.consent()["language"])
+    return [parts[id] for id in ids if id in parts and id != CONSENT]
+
+
+def signature(files: Sequence[Path]) -> list[list]:
+    """What tells these files from others, and from other takes under the same names."""
+    return [[file.name, file.stat().st_size, file.stat().st_mtime] for file in files]

@@ -1,0 +1,175 @@
+import { copyFileSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { afterAll, afterEach, beforeAll, beforeEach, expect, inject, test } from 'vitest';
+import { judge } from '../../support/browser/axe.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { runPython } from '../../support/python.ts';
+import { scratchFolder } from '../../support/scratch.ts';
+import { ChatServer } from '../../support/servers/server.ts';
+
+const PATIENCE = { timeout: 90_000 };
+const folder = scratchFolder();
+const person = join(folder, 'Ida');
+const grey = join(scratchFolder(), 'grey.mp4');
+const { demo } = inject('shared');
+let server: ChatServer;
+let browser: Browser;
+let page: Browser['page'];
+
+beforeAll(async () => {
+  server = await ChatServer.studio(folder);
+});
+beforeEach(() => void runPython('studio/recorded.py', folder, 'Ida', grey));
+afterEach(async () => {
+  await browser.close();
+  rmSync(person, { recursive: true, force: true });
+});
+afterAll(() => server.stop());
+
+/** Opens Ida's recording. */
+async function open(width = 1280, height = 800): Promise<void> {
+  browser = await Browser.launch({ width, height });
+  page = browser.page;
+  page.on('dialog', (dialog) => void dialog.accept());
+  await page.goto(server.url);
+  await page.click('#people button');
+  await page.waitForSelector('#room:visible');
+}
+
+/** How far the making is said to be; of a stopped one, of the recordings and the body as they are now. */
+function progress(state: string, more: Record<string, unknown> = {}): void {
+  mkdirSync(join(person, 'making'), { recursive: true });
+  const parts = JSON.parse(runPython('studio/signed.py', person)) as unknown[];
+  const known = { state, quality: 'quick', step: 'learn', share: 0.42, advice: [], made_of: { parts, on: [] } };
+  writeFileSync(join(person, 'making', 'progress.json'), JSON.stringify({ ...known, ...more }));
+}
+
+const bodyOf = () => JSON.parse(readFileSync(join(person, 'body.json'), 'utf8')) as object;
+const visible = (...ids: string[]) => Promise.all(ids.map((id) => page.isVisible(`#${id}`)));
+
+test('build and clothes of a body are chosen in pictures, kept, and said to be made', async () => {
+  await open(390, 844);
+  expect(await page.isChecked('#bodies [value=alone]')).toBe(true);
+  expect(await page.isVisible('#looks')).toBe(false);
+  expect(await page.textContent('#body-about')).toBe('All that is seen is recorded from you.');
+  await page.check('#bodies [value=whole]');
+  await page.waitForSelector('#looks:visible');
+  await page.check('#bodies [value=sturdy]');
+  await expect.poll(bodyOf).toEqual({ wanted: true, build: 'sturdy', outfit: 'recorded' });
+  await page.check('#bodies [value=wine]');
+  await expect.poll(bodyOf).toEqual({ wanted: true, build: 'sturdy', outfit: 'wine' });
+  expect(await page.textContent('#body-about')).toMatch(/^Your head and face are recorded\. The body below the neck is made/);
+  const pictures = await page.$$eval('#looks label', (labels) =>
+    labels.map((label) => getComputedStyle(label, '::before').backgroundPosition),
+  );
+  expect(pictures).toEqual(['100% 0%', '100% 50%', '100% 100%', '0% 100%', '50% 100%', '100% 100%']); // one sheet, outfits across
+  expect(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth)).toBeLessThanOrEqual(0);
+  await judge(page, 'studio body');
+  await page.reload();
+  await page.waitForSelector('#looks:visible');
+  expect(await page.isChecked('#bodies [value=sturdy]')).toBe(true);
+  expect(await page.isChecked('#bodies [value=wine]')).toBe(true);
+  expect(await page.textContent('#title')).toBe('Ida');
+}, 60_000);
+
+test('a reload and the browser’s Back lead where one was', async () => {
+  await open();
+  await page.click('[data-part=left]');
+  await page.reload();
+  await page.waitForSelector('[data-part=left][aria-pressed=true]');
+  await page.click('#back');
+  await page.waitForSelector('#start:visible');
+  await page.goBack();
+  await page.waitForSelector('#room:visible');
+  expect(await page.textContent('#title')).toBe('Ida');
+  await page.goBack();
+  await page.waitForSelector('#start:visible');
+  await page.goForward();
+  await page.waitForSelector('#room:visible');
+}, 60_000);
+
+test('a making that was stopped says where, and each of its buttons does what it says', async () => {
+  progress('stopped');
+  await open();
+  expect(await page.textContent('#made')).toBe('Stopped at: Learning the face, 42 %');
+  expect(await visible('again', 'anew', 'discard', 'halt', 'talk')).toEqual([true, true, true, false, false]);
+  expect(await page.textContent('#choices')).toMatch(/^“Go on” continues where it stopped/);
+  expect(await page.textContent('#go')).toBe('Start over');
+  await judge(page, 'studio stopped');
+  await page.click('#again');
+  await page.waitForSelector('#halt:visible');
+  expect(await page.isVisible('#room')).toBe(false);
+  await page.click('#halt');
+  await page.waitForSelector('#again:visible');
+  writeFileSync(join(person, 'making', 'learnt'), '');
+  await page.click('#anew');
+  await page.waitForSelector('#halt:visible');
+  expect(existsSync(join(person, 'making', 'learnt'))).toBe(false);
+  await page.click('#halt');
+  await page.click('#discard');
+  await page.waitForSelector('#making', { state: 'hidden' });
+  expect(existsSync(join(person, 'making'))).toBe(false);
+  expect(await page.textContent('#go')).toBe('Make my avatar');
+  expect(readdirSync(join(person, 'parts')).filter((name) => name.endsWith('.mp4'))).toEqual(['consent.mp4', 'left.mp4', 'text-1.mp4']);
+}, 120_000);
+
+test('with other recordings nothing goes on, and that is said', async () => {
+  progress('stopped', { made_of: { parts: [], on: [] } });
+  await open();
+  expect(await visible('again', 'anew', 'discard')).toEqual([false, true, true]);
+  expect(await page.textContent('#choices')).toMatch(/^The recordings have changed since, so it starts over/);
+}, 60_000);
+
+test.skipIf(!demo)('recordings without a face are refused in the language of the page, and stay', async () => {
+  await open();
+  await page.selectOption('#language', 'de');
+  await page.selectOption('#quality', 'quick');
+  await page.click('#go');
+  await page.waitForSelector('#anew:visible', PATIENCE);
+  expect(await page.textContent('#error')).toMatch(/^Kein Gesicht gefunden: Filmen Sie einen wirklichen Menschen/);
+  expect(await visible('again', 'anew', 'discard')).toEqual([false, true, true]);
+  expect(await page.textContent('#choices')).toMatch(/^Von dort geht es mit diesen Aufnahmen nicht weiter/);
+  expect(readdirSync(join(person, 'parts'))).toContain('text-1.mp4');
+}, 200_000);
+
+test.skipIf(!demo)('a video without a face is not kept, and the page says what create says', async () => {
+  await open(390, 844);
+  await page.selectOption('#language', 'fr');
+  await page.setInputFiles('#file', grey);
+  await page.waitForSelector('#problem:visible', PATIENCE);
+  expect(await page.textContent('#problem')).toMatch(/^Aucun avatar ne peut être créé à partir de cette vidéo.* Aucun visage trouvé : filmez/);
+  expect(readdirSync(join(person, 'parts')).filter((name) => name.startsWith('upload'))).toEqual([]);
+  expect(await page.isVisible('[data-part=upload]')).toBe(false);
+}, 120_000);
+
+test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not made again for nothing', async () => {
+  copyFileSync(demo!, join(person, 'Ida.ico3d'));
+  progress('made', { step: 'bake', share: 1, decibels: 31.24 });
+  await open();
+  expect(await page.textContent('#made')).toBe('Ida is there');
+  expect(await page.textContent('#made-of')).toBe('Recorded: all that is seen, head and shoulders.');
+  await page.selectOption('#quality', 'quick');
+  expect(await page.isDisabled('#go')).toBe(true);
+  expect(await page.textContent('#first')).toMatch(/^It is there, made in just this way/);
+  await page.selectOption('#quality', 'best');
+  expect(await page.isDisabled('#go')).toBe(false);
+  expect(await page.textContent('#go')).toBe('Make it again');
+  await page.click('#talk');
+  await page.waitForURL((url) => !url.href.startsWith(server.url), PATIENCE);
+  await page.goBack();
+  await page.waitForSelector('#talk:visible');
+  expect(await page.textContent('#title')).toBe('Ida');
+  expect(await page.textContent('#talk')).toBe('Talk with the avatar');
+  expect(await page.isDisabled('#talk')).toBe(false);
+}, 200_000);
+
+test('a tab on somebody who was deleted elsewhere says so by itself, and a new recording can begin', async () => {
+  await open();
+  rmSync(person, { recursive: true });
+  await page.waitForSelector('#start:visible');
+  await expect.poll(() => page.textContent('#problem'), PATIENCE).toBe(
+    'Ida was deleted elsewhere, in another tab or by hand: begin a new recording here.',
+  );
+  expect(await page.evaluate(() => document.activeElement?.id)).toBe('name');
+  expect(page.url()).not.toContain('Ida');
+}, 60_000);
