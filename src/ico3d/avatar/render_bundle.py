@@ -15,7 +15,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
-from ico3d.head.neck import bent
+from ico3d.head.portrait.neck import bent
 from ico3d.splat import harmonics
 from ico3d.splat.files.formats import read_gaussians
 from ico3d.splat.gaussians import Gaussians, cat

@@ -18,6 +18,7 @@ from ico3d.errors import BundleError
 HEAD = "head.safetensors"
 HEAD_REST = "head_rest.safetensors"
 POSES = "head_poses.safetensors"
+SHOULDERS = "head_shoulders.safetensors"
 _AXES: Axes = {
     "means": 0,
     "quats": 0,
@@ -135,6 +136,45 @@ class BakedHead:
         return head
 
 
+@dataclass(frozen=True)
+class BakedShoulders:
+    """Where the shoulders are, and which Gaussians are theirs.
+
+    Attributes:
+        share: (N,) uint8 how much of the shoulders' movement each Gaussian of the head makes, 255
+            for all of it.
+        world_from_shoulders: (F, 4, 4) float32 rigid: where canonical head space is in each head
+            pose for whatever moves with the shoulders.
+    """
+
+    share: np.ndarray
+    world_from_shoulders: np.ndarray
+
+    def to_bytes(self) -> bytes:
+        """The content of `head_shoulders.safetensors`.
+
+        Raises:
+            BundleError: If shapes or dtypes do not fit, or a transform is not rigid.
+        """
+        _check_rigid(self.world_from_shoulders, SHOULDERS)
+        return encode_tensors(
+            vars(self), _shoulders_spec(len(self.share), len(self.world_from_shoulders)), SHOULDERS
+        )
+
+    @staticmethod
+    def from_bytes(data: bytes, info: HeadInfo) -> "BakedShoulders":
+        """Reads the file, and checks it against the manifest's counts.
+
+        Raises:
+            BundleError: If the file is malformed, or a transform is not rigid.
+        """
+        tensors = decode_tensors(
+            data, _shoulders_spec(info.num_gaussians, info.num_poses), SHOULDERS
+        )
+        _check_rigid(tensors["world_from_shoulders"], SHOULDERS)
+        return BakedShoulders(**tensors)
+
+
 def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
     """The content of `head_poses.safetensors` from (F, 4, 4) rigid transforms.
 
@@ -143,7 +183,7 @@ def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
     """
     spec = _poses_spec(len(world_from_head))
     poses = np.asarray(world_from_head, np.float32)
-    check_rigid(poses, POSES)
+    _check_rigid(poses, POSES)
     return encode_tensors({"world_from_head": poses}, spec, POSES)
 
 
@@ -154,7 +194,7 @@ def poses_from_bytes(data: bytes, num_poses: int) -> np.ndarray:
         BundleError: If the file is malformed or a pose is not rigid.
     """
     poses = decode_tensors(data, _poses_spec(num_poses), POSES)["world_from_head"]
-    check_rigid(poses, POSES)
+    _check_rigid(poses, POSES)
     return poses
 
 
@@ -177,6 +217,10 @@ def _poses_spec(f: int) -> Spec:
     return {"world_from_head": ("F32", (f, 4, 4))}
 
 
+def _shoulders_spec(n: int, f: int) -> Spec:
+    return {"share": ("U8", (n,)), "world_from_shoulders": ("F32", (f, 4, 4))}
+
+
 def _check_values(head: BakedHead) -> None:
     if np.abs(head.means).max() > _MAX_LENGTH:
         raise BundleError(f"{HEAD}: 'means' reaches farther than {_MAX_LENGTH:g} m.")
@@ -187,7 +231,7 @@ def _check_values(head: BakedHead) -> None:
         raise BundleError(f"{HEAD}: 'quats' are not normalised.")
 
 
-def check_rigid(poses: np.ndarray, file: str) -> None:
+def _check_rigid(poses: np.ndarray, file: str) -> None:
     """Checks transforms (F, 4, 4) of a file.
 
     Raises:

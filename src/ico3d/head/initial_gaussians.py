@@ -15,8 +15,8 @@ from ico3d.common.camera import Camera
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape, Variant
+from ico3d.head.portrait.shoulders import neck_of
 from ico3d.head.settings import HeadSettings
-from ico3d.head.shoulders import neck_of
 from ico3d.head.views import view_of
 from ico3d.splat.initial import in_pictures, resampled, spacing
 

@@ -13,7 +13,7 @@ from ico3d.common.expression import TURN_SIZE
 from ico3d.errors import ModelError
 from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
-from ico3d.head.neck import Neck
+from ico3d.head.portrait.neck import Neck
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors

@@ -17,8 +17,8 @@ from ico3d.head.expressions import ExpressionTrack, turn_of, turn_values
 from ico3d.head.learning_rows import LearningRows
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
+from ico3d.head.portrait.shoulders import shoulders_of
 from ico3d.head.settings import SGD_GAINS, HeadSettings
-from ico3d.head.shoulders import shoulders_of
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions

@@ -16,7 +16,7 @@ from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack, turn_values
 from ico3d.head.model_folder import TrainedHead
-from ico3d.head.shoulders import shoulders_of
+from ico3d.head.portrait.shoulders import shoulders_of
 from ico3d.head.views import (
     GREY,
     SHOWS_MOUTH,

@@ -35,3 +35,21 @@ async def test_answers_are_short_and_plain(monkeypatch):
         with pytest.raises(httpx2.ReadError, match="compressed"):
             await client.post(url)
     assert accepted == ["identity"] * 3
+
+
+async def test_events_come_no_faster_than_visitors_can_bear(monkeypatch):
+    from ico3d.chat.tools import bounded_http
+
+    monkeypatch.setattr(bounded_http, "EVENTS_AT_ONCE", 20.0)
+    app = FastAPI()
+
+    @app.get("/{count}")
+    async def events(count: int) -> Response:
+        return Response(b"event: message\ndata: {}\n\n" * count, media_type=bounded_http.EVENTS)
+
+    transport = bounded_http.BoundedTransport(trust_env=False)
+    async with running(app) as port, httpx2.AsyncClient(transport=transport) as client:
+        url = f"http://127.0.0.1:{port}"
+        assert (await client.get(f"{url}/20")).content.count(b"data:") == 20
+        with pytest.raises(httpx2.ReadError, match="too many events"):
+            await client.get(f"{url}/21")

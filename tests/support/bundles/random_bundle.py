@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from ico3d.bundle.format import write_bundle
-from ico3d.bundle.head import BakedHead, poses_to_bytes
+from ico3d.bundle.head import BakedHead, BakedShoulders, poses_to_bytes
 from ico3d.bundle.manifest import (
     CameraInfo,
     HeadInfo,
@@ -21,7 +21,6 @@ from ico3d.bundle.manifest import (
     Provenance,
     SpeechInfo,
 )
-from ico3d.bundle.shoulders import BakedShoulders
 
 EXPRESSION_SIZE, EYE_OFFSET, FPS, NUM_POSES = 39, 32, 25.0, 50
 

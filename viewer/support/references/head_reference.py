@@ -14,7 +14,7 @@ import numpy as np
 
 from ico3d.bundle import evaluate
 from ico3d.bundle.format import Bundle, add_files
-from ico3d.bundle.shoulders import SHOULDERS
+from ico3d.bundle.head import SHOULDERS
 from support.bundles.random_bundle import still_shoulders, write_random_bundle
 
 NUM_EXPRESSIONS = 5

@@ -14,20 +14,19 @@ from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_p
 from ico3d.avatar.baking.telling.about import About
 from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, coarse_first, write_bundle
-from ico3d.bundle.head import BakedHead, poses_to_bytes
+from ico3d.bundle.head import SHOULDERS, BakedHead, BakedShoulders, poses_to_bytes
 from ico3d.bundle.manifest import (
     HeadInfo,
     Loss,
     Manifest,
     SpeechInfo,
 )
-from ico3d.bundle.shoulders import SHOULDERS, BakedShoulders
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.model_folder import TrainedHead
-from ico3d.head.shoulders import shoulders_of
+from ico3d.head.portrait.shoulders import shoulders_of
 from ico3d.head.views import PictureCache
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable

@@ -18,7 +18,7 @@ from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.model_folder import TrainedHead
-from ico3d.head.shoulders import shoulders_of
+from ico3d.head.portrait.shoulders import shoulders_of
 from ico3d.head.views import PictureCache, View, staged
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render

@@ -8,6 +8,7 @@ from typing import Any
 
 from openai import DefaultAsyncHttpxClient
 
+from ico3d.chat.services.bounded import ask_plain, bound
 from ico3d.chat.settings.keys import NONE, OPENAI, goes_here, is_openai, key_for
 
 OWN_HEADERS = ("OpenAI-Organization", "OpenAI-Project")
@@ -20,7 +21,7 @@ def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict
     """Options of the SDK's client for one server.
 
     Redirects are not followed, so that neither key nor words reach another server. Servers on this
-    machine are not asked through a proxy.
+    machine are not asked through a proxy. What they answer is bounded.
 
     Args:
         url: Address of the server; empty for OpenAI's.
@@ -32,7 +33,8 @@ def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict
         SettingsError: If the key is missing or may not be sent to this address.
     """
     key = key_for(url, key_variable, where) or NONE
-    hooks = {} if is_openai(url) else {"request": [_without_openais(key)]}
+    own = [] if is_openai(url) else [_without_openais(key)]
+    hooks = {"request": [ask_plain, *own], "response": [bound]}
     secure = not url.startswith("http:")  # else certificates would be read for nothing
     client = DefaultAsyncHttpxClient(
         follow_redirects=False,

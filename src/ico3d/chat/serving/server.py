@@ -24,6 +24,7 @@ from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.network.certificates import Certificate
+from ico3d.chat.serving.network.handshakes import behind_tls
 from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.running.ending import PatientServer
@@ -194,10 +195,8 @@ def make_server(
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,
         server_header=False,
-        http=PromptProtocol,
+        http=behind_tls(certificate) if certificate else PromptProtocol,
         proxy_headers=bool(proxies),
         forwarded_allow_ips=list(proxies),
-        ssl_certfile=certificate.file if certificate else None,
-        ssl_keyfile=certificate.key if certificate else None,
     )
     return PatientServer(config, sessions)

@@ -1,42 +1,61 @@
 """HTTP for MCP servers, whose answers cannot fill the memory. Imported only where mcp is."""
 
+import time
 from collections.abc import AsyncIterator
 
 import httpx2
 
+from ico3d.chat.supervision.allowance import Bucket
+
 MOST_BYTES = 4 << 20
 """Of an answer, which may be the list of all functions."""
 EVENTS = "text/event-stream"
+EVENT_RATE, EVENTS_AT_ONCE = 50.0, 1000.0
+"""Events of a server per second for long, and at once: each costs the loop of all visitors time."""
 
 
 class BoundedTransport(httpx2.AsyncHTTPTransport):
     """Reads no more of an answer than `MOST_BYTES`, and none that is compressed.
 
-    A stream of events may go on for long: the SDK bounds each of them.
+    A stream of events may go on for long: the SDK bounds each of them, and this their number.
     """
+
+    def __init__(self, trust_env: bool = True):
+        """Connects; proxies that the environment names are used if that is trusted."""
+        super().__init__(trust_env=trust_env)
+        self._events = Bucket(EVENT_RATE, EVENTS_AT_ONCE, time.monotonic)  # of all streams
 
     async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
         """Sends a request.
 
         Raises:
-            ReadError: If the answer is compressed; while it is read, if it is large.
+            ReadError: If the answer is compressed; while it is read, if it is large or has too many
+                events.
         """
         request.headers["Accept-Encoding"] = "identity"
         response = await super().handle_async_request(request)
         if response.headers.get("Content-Encoding", "identity") != "identity":
             await response.aclose()
             raise httpx2.ReadError("its answer is compressed")
-        if not response.headers.get("Content-Type", "").startswith(EVENTS):
-            response.stream = _Bounded(response.stream)
+        streams = response.headers.get("Content-Type", "").startswith(EVENTS)
+        kind = _Paced(response.stream, self._events) if streams else _Bounded(response.stream)
+        response.stream = kind
         return response
 
 
-class _Bounded(httpx2.AsyncByteStream):
-    """The bytes of an answer, up to `MOST_BYTES`."""
+class _Wrapped(httpx2.AsyncByteStream):
+    """The bytes of an answer."""
 
     def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream):
         assert isinstance(stream, httpx2.AsyncByteStream)
         self._stream = stream
+
+    async def aclose(self) -> None:
+        await self._stream.aclose()
+
+
+class _Bounded(_Wrapped):
+    """The bytes of an answer, up to `MOST_BYTES`."""
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
         size = 0
@@ -46,5 +65,16 @@ class _Bounded(httpx2.AsyncByteStream):
                 raise httpx2.ReadError(f"its answer has more than {MOST_BYTES} bytes")
             yield piece
 
-    async def aclose(self) -> None:
-        await self._stream.aclose()
+
+class _Paced(_Wrapped):
+    """The bytes of a stream of events, as long as these do not come too fast."""
+
+    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, events: Bucket):
+        super().__init__(stream)
+        self._events = events
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        async for piece in self._stream:
+            if not self._events.take(piece.count(b"data:") + piece.count(b"\n:")):
+                raise httpx2.ReadError("it sends too many events")
+            yield piece

@@ -184,6 +184,14 @@ async def test_a_model_that_only_calls_functions_is_made_to_speak(bundle):
     assert offered == 2 * [*[True] * MOST_ROUNDS, False], "each turn anew"
 
 
+async def test_a_model_that_calls_what_it_was_not_offered_is_not_obeyed(bundle):
+    script = Script(lambda body: [Call("mood", {"name": "happy"})])
+    async with talking(bundle, script) as page:
+        assert (await ask(page, "hi", 0))[0].startswith("Sorry")
+    offered = ["tools" in body for body in script.requests]
+    assert offered == [*[True] * MOST_ROUNDS, False]
+
+
 async def test_a_users_tool_is_called_and_its_answer_spoken(bundle):
     tools, asked = FastAPI(), []
 

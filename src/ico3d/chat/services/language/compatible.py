@@ -1,7 +1,7 @@
 """pipecat's OpenAI service, adapted to servers that lack some of OpenAI's features."""
 
 import contextlib
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Sequence
 from contextvars import ContextVar
 from typing import Any
 
@@ -12,6 +12,7 @@ from openai.types.chat.chat_completion_chunk import ChoiceDelta
 from pipecat.adapters.llm.services.open_ai_adapter import OpenAILLMInvocationParams
 from pipecat.frames.frames import LLMThoughtTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.services.llm_service import FunctionCallFromLLM
 from pipecat.services.openai.llm import OpenAILLMService
 
 from ico3d.chat.observing.failures import cause
@@ -21,6 +22,8 @@ from ico3d.chat.settings.keys import is_openai
 
 MOST_ROUNDS = 4
 """How often a model may call functions in one turn before it must answer in words."""
+MOST_CALLS = 8
+"""Functions that one answer may call: a visitor can talk a model into asking for many."""
 COMPLETE = ("stop", "tool_calls", "function_call")
 """Reasons for the end of an answer that was not cut off."""
 _opens: dict[tuple[str, str], bool] = {}
@@ -59,7 +62,7 @@ class CompatibleModel(OpenAILLMService):
                 model=model, system_instruction=instruction, **sampling
             ),
         )
-        self._functions_allowed = functions
+        self._functions_allowed = self._may_call = functions
         self._place = (str(client["base_url"]), model)
         if is_openai(client["base_url"]):
             _opens.setdefault(self._place, False)  # its thoughts stay with it
@@ -73,7 +76,8 @@ class CompatibleModel(OpenAILLMService):
     ) -> dict[str, Any]:
         """The parameters of a request, without functions if there are none."""
         params = super().build_chat_completion_params(params_from_context)
-        if not self._functions_allowed or rounds(params["messages"]) >= MOST_ROUNDS:
+        self._may_call = self._functions_allowed and rounds(params["messages"]) < MOST_ROUNDS
+        if not self._may_call:
             for name in ("tools", "tool_choice"):
                 params.pop(name, None)
         if _summarising.get():
@@ -88,6 +92,18 @@ class CompatibleModel(OpenAILLMService):
         finally:
             _summarising.reset(token)
         return text and without_thoughts(text)
+
+    async def run_function_calls(self, function_calls: Sequence[FunctionCallFromLLM]) -> None:
+        """Calls the functions that an answer asks for, the first ones of too many.
+
+        Some servers' models call functions although they were offered none.
+        """
+        if not self._may_call:
+            logger.warning("language called functions that it was not offered; none is run")
+            return
+        if len(function_calls) > MOST_CALLS:
+            logger.warning(f"language called {len(function_calls)} functions; {MOST_CALLS} are run")
+        await super().run_function_calls(function_calls[:MOST_CALLS])
 
     # type: ignore (whoever reads the stream asks it for no more than chunks)
     async def get_chat_completions(
@@ -152,7 +168,7 @@ class CompatibleModel(OpenAILLMService):
         if apart:
             await self._tell(thoughts.separate())
         if delta.content:
-            parts = thoughts.push(delta.content)
+            parts = thoughts.push(sendable(delta.content))
             delta.content = parts.said or None
             apart = apart if parts.said else (apart or "") + parts.thought
         if apart is not None:
@@ -183,6 +199,11 @@ async def _closing(
             yield chunk
     finally:
         await stream.close()
+
+
+def sendable(text: str) -> str:
+    """A text without halves of characters, which JSON can hold and nothing can send on."""
+    return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def rounds(messages: list[dict[str, Any]]) -> int:

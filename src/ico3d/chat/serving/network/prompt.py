@@ -33,11 +33,10 @@ class PromptProtocol(HttpToolsProtocol):
         self._machine = "" if self.client and self.client[0] in proxies else machine_of(self.client)
         self._counted, self._head_bytes, self._in_body = True, 0, False
         self._deadline: asyncio.TimerHandle | None = None
-        _open[self._machine] += 1
-        if self._machine and _open[self._machine] > MOST_OPEN:
-            transport.abort()
-        else:
+        if count_in(self._machine):
             self._await_head()
+        else:
+            transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forgets the connection."""
@@ -93,9 +92,20 @@ class PromptProtocol(HttpToolsProtocol):
     def _uncount(self) -> None:
         if self._counted:
             self._counted = False
-            _open[self._machine] -= 1
-            if not _open[self._machine]:
-                del _open[self._machine]
+            count_out(self._machine)
+
+
+def count_in(machine: str) -> bool:
+    """Counts a connection of a machine; returns whether it may have that many."""
+    _open[machine] += 1
+    return not machine or _open[machine] <= MOST_OPEN
+
+
+def count_out(machine: str) -> None:
+    """A connection that was counted is closed, or counted elsewhere."""
+    _open[machine] -= 1
+    if not _open[machine]:
+        del _open[machine]
 
 
 def allow_many_connections() -> None:

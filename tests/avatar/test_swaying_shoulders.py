@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.render_bundle import baked_gaussians, swaying_head
 from ico3d.bundle.format import Bundle, add_files, write_bundle
+from ico3d.bundle.head import SHOULDERS
 from ico3d.bundle.manifest import Manifest
-from ico3d.bundle.shoulders import SHOULDERS
 from ico3d.errors import BundleError
 from support.bundles.random_bundle import (
     NUM_POSES,

@@ -15,8 +15,8 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.common.spread import spread
-from ico3d.head.neck import Neck, bent
-from ico3d.head.shift import Seen, shift
+from ico3d.head.portrait.neck import Neck, bent
+from ico3d.head.portrait.shift import Seen, shift
 from ico3d.head.views import PictureCache, View, head_pose
 from ico3d.splat.gaussians import Gaussians
 

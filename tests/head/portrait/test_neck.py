@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.head.learning_rows import LearningRows
 from ico3d.head.model import HeadModel
-from ico3d.head.neck import BELOW, BENDS, Neck, bent
+from ico3d.head.portrait.neck import BELOW, BENDS, Neck, bent
+from ico3d.head.portrait.shift import Seen, shift
+from ico3d.head.portrait.shoulders import Shoulders, neck_of, resting_place, shoulders_of
 from ico3d.head.settings import PRESETS
-from ico3d.head.shift import Seen, shift
-from ico3d.head.shoulders import Shoulders, neck_of, resting_place, shoulders_of
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import PictureCache, head_pose
 from ico3d.measure.head import evaluate_head

@@ -1,0 +1,51 @@
+"""Answers of OpenAI-compatible servers, which cannot fill the memory. Imported with `client`."""
+
+from collections.abc import AsyncIterator
+
+import httpx2
+
+MOST_BYTES = 32 << 20
+"""Of an answer: a language model's with its thoughts, or the sound of what is said at once."""
+MOST_OF_LINE = 1 << 20
+"""Bytes of a line of a stream of events, which is kept until it ends."""
+EVENTS = "text/event-stream"
+PLAIN = "identity"
+
+
+async def ask_plain(request: httpx2.Request) -> None:
+    """Asks for an answer without compression, in which a little becomes much."""
+    request.headers["Accept-Encoding"] = PLAIN
+
+
+async def bound(response: httpx2.Response) -> None:
+    """Has no more of an answer read than is allowed.
+
+    Raises:
+        ReadError: If the answer is compressed; while it is read, if it is too large.
+    """
+    if response.headers.get("Content-Encoding", PLAIN) != PLAIN:
+        await response.aclose()
+        raise httpx2.ReadError("its answer is compressed")
+    lines = response.headers.get("Content-Type", "").startswith(EVENTS)
+    assert isinstance(response.stream, httpx2.AsyncByteStream)
+    response.stream = _Bounded(response.stream, lines)
+
+
+class _Bounded(httpx2.AsyncByteStream):
+    """The bytes of an answer, up to `MOST_BYTES`; of its lines, up to `MOST_OF_LINE`."""
+
+    def __init__(self, stream: httpx2.AsyncByteStream, lines: bool):
+        self._stream, self._lines = stream, lines
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        size = line = 0
+        async for piece in self._stream:
+            size += len(piece)
+            end = piece.rfind(b"\n")
+            line = line + len(piece) if end < 0 else len(piece) - end - 1
+            if size > MOST_BYTES or (self._lines and line > MOST_OF_LINE):
+                raise httpx2.ReadError("its answer is too large")
+            yield piece
+
+    async def aclose(self) -> None:
+        await self._stream.aclose()

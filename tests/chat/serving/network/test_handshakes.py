@@ -1,0 +1,66 @@
+"""Who begins TLS handshakes and ends none holds few connections, and not for long."""
+
+import asyncio
+import contextlib
+import ssl
+from datetime import UTC, datetime
+
+import pytest
+
+from ico3d.chat.serving.network import handshakes, prompt
+from ico3d.chat.serving.network.certificates import own_certificate
+from support.chat.serving import serving, visiting
+
+
+@pytest.fixture
+async def secured(body, tmp_path):
+    """Port of a server with HTTPS, and the context of a client that trusts it."""
+    certificate = own_certificate(tmp_path, ["127.0.0.1"], datetime.now(UTC))
+    trust = ssl.create_default_context(cafile=certificate.file)
+    async with serving(body, certificate=certificate) as (url, _):
+        yield int(url.rstrip("/").rpartition(":")[2]), trust
+
+
+async def is_closed(reader, seconds):
+    with contextlib.suppress(ConnectionResetError):
+        return await asyncio.wait_for(reader.read(), seconds) is not None
+    return True
+
+
+async def health(port, trust):
+    async with visiting(verify=trust) as client:
+        return (await client.get(f"https://127.0.0.1:{port}/health")).status_code
+
+
+async def test_handshakes_count_as_connections_of_their_machine(secured, monkeypatch):
+    port, trust = secured
+    monkeypatch.setattr(prompt, "MOST_OPEN", 3)
+    for module in (prompt, handshakes):
+        monkeypatch.setattr(module, "machine_of", lambda client: client and "10.0.0.7")
+    lines = [await asyncio.open_connection("127.0.0.1", port) for _ in range(5)]
+    assert await is_closed(lines[3][0], 5) and await is_closed(lines[4][0], 5)
+    for _, writer in lines[:2]:
+        writer.close()
+    await asyncio.sleep(0.5)
+    assert await health(port, trust) == 200  # in a place that has become free
+    lines[2][1].close()
+    await asyncio.sleep(0.5)
+    assert prompt._open["10.0.0.7"] == 0
+
+
+@pytest.mark.parametrize("sent", [b"", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc"])
+async def test_a_handshake_that_does_not_end_is_given_up(secured, monkeypatch, sent):
+    monkeypatch.setattr(prompt, "HEAD", 1.0)
+    reader, writer = await asyncio.open_connection("127.0.0.1", secured[0])
+    writer.write(sent)
+    assert await is_closed(reader, 5)
+    writer.close()
+
+
+async def test_what_is_no_handshake_is_closed_and_others_are_served(secured):
+    port, trust = secured
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    assert await is_closed(reader, 5)
+    writer.close()
+    assert await asyncio.gather(*(health(port, trust) for _ in range(30))) == [200] * 30
