@@ -67,15 +67,15 @@ class Shot:
         return ("--cameras", self.cameras, "--views-per-frame", self.views, *near, *size)
 
 
-HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=25)
-"""A minute of talk, each frame from another side."""
+HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
+"""Two minutes of talk, each frame from another side; every second frame of a film would repeat."""
 BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=8)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 55 --initial.gaussians 30000 --density.max-gaussians 55000 "
+    "--steps-per-frame 130 --initial.gaussians 30000 --density.max-gaussians 55000 "
     "--density.until 0.6 --joining.no-match-colors"
 )
 

@@ -80,7 +80,9 @@ def rolled(before: np.ndarray, now: np.ndarray, after: np.ndarray) -> np.ndarray
     try:
         import cv2
     except ModuleNotFoundError:
-        raise MissingExtraError("cv2", "face", "a webcam's rolling shutter") from None
+        raise MissingExtraError(
+            "opencv-contrib-python", "body", "a webcam's rolling shutter"
+        ) from None
 
     height, width = now.shape[:2]
     late = READOUT * ((np.arange(height, dtype=np.float32) + 0.5) / height - 0.5)  # (H,)
