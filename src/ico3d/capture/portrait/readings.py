@@ -75,12 +75,13 @@ def read_faces(
                 in_a_row += again
                 readings.repeated.append(number)
                 continue
-            before, in_a_row = image, 0
+            in_a_row = 0
             save_picture(work / "ori_imgs" / f"{number}.jpg", image)
             face = reader.read(image)
             if face is None:
                 readings.missing.append(number)
                 continue
+            before = image
             readings.frames.append(number)
             readings.landmarks.append(face.landmarks)
             readings.blendshapes.append(face.blendshapes)
