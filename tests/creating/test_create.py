@@ -214,7 +214,7 @@ def test_the_terminal_says_what_matters(tracked, settings, capfd):
     assert main(words) == 0
     said = " ".join(capfd.readouterr().out.split())
     for part in (
-        "What would make the avatar better: - at 2 to 3 s: blurred.",
+        "What would make the avatar better: - at 2 to 3 s: the face is blurred: wipe the lens",
         "Quality good takes about",
         "all in all: quick",
         "On 2 pictures that it never saw:",

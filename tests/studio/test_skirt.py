@@ -192,7 +192,7 @@ def test_a_shirt_is_tucked_in(turning, subject):
     wearer, least = turning[0], waist_height(subject) - 0.02
     shirt = wearer.faces[wearer.materials == Material.CLOTH]
     assert (wearer.vertices[shirt][..., 1].max(axis=1) > least).all()
-    bare, worn = (np.bincount(p.materials, minlength=14) for p in (subject, wearer))
+    bare, worn = (np.bincount(p.materials, minlength=len(Material)) for p in (subject, wearer))
     others = [m for m in Material if m not in (Material.CLOTH, Material.SKIRT)]
     np.testing.assert_array_equal(bare[others], worn[others])
 

@@ -91,7 +91,7 @@ class Studio:
         app = make_app(room, self.host, sites, reach.answered)
         url = server.address(listener, reach.scheme)
         listener.listen()
-        print(f"The studio is at {url}{fragment(key)} (Ctrl+C ends)")
+        print(f"The studio is at {url}{fragment(key)} (Ctrl+C ends)", flush=True)
         print("\n".join(reach.told(listener.getsockname()[1], key)))
         print(f"Recordings and avatars are in {self.folder}")
         if room.eye.lacking:

@@ -87,7 +87,7 @@ def video(tmp_path, monkeypatch):
         stream = container.add_stream("libx264", rate=25)
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         for level in range(FRAMES):
-            picture = np.full((HEIGHT, WIDTH, 3), 90 + level, np.uint8)
+            picture = np.full((HEIGHT, WIDTH, 3), 90 + 9 * level, np.uint8)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode())
     return path

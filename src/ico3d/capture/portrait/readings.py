@@ -15,7 +15,7 @@ from ico3d.capture.video import Video
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
-BLOCK, SAME = 8, 8.0
+BLOCK, SAME = 8, 3.0
 """Side of the parts of a picture that are compared, in every other of its pixels, and the mean
 difference, of 255, below which they are the same but for hasty compression."""
 MOST_REPEATED = 2
