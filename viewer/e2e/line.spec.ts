@@ -13,6 +13,7 @@ import { finished, lastOnset, makeVoice, openPage, SENTENCE, SILENCE, until } fr
 
 const folder = scratchFolder();
 const LONG_ENOUGH = 2000; // ms of speech that the mouth is watched for
+const MOST_ANSWERS = 5; // that are watched for
 const EASED = 700; // ms until the face rests after it has been silenced
 
 describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a talk with the avatar', () => {
@@ -79,24 +80,11 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
   });
 
   test('the mouth moves with the sound, and only then', async () => {
-    // The sentence is said again and again: where the answers come late, several of them are watched.
+    // The sentence is said again and again: where answers come late, or few pictures are drawn, several of them are watched.
     const since = (await readMouth(browser.page)).sights[0]!.at;
-    const { loudness } = await until(browser, (record) => spoken(record, since) > LONG_ENOUGH, 60_000);
-    const { sights, pictures } = await readMouth(browser.page);
-    const end = loudness.at(-1)!.at;
-
-    const watched = sights.filter(({ at }) => at < end);
-    const together = correlation(watched.map(({ at }) => heard(loudness, at)), watched.map(({ speech }) => speech));
-    /** What changed in the pictures before which it was heard, or not, all of the time. */
-    const changes = (audible: boolean, before: number) =>
-      pictures
-        .filter(({ at }) => {
-          const levels = loudness.filter((one) => one.at > at - before && one.at < at);
-          return at < end && levels.length > 0 && levels.every(({ level }) => level > SILENCE === audible);
-        })
-        .map(({ change }) => change);
-    const during = changes(true, 200);
-    const rest = changes(false, EASED);
+    let seen = await watched(since, LONG_ENOUGH);
+    for (let more = 2; more <= MOST_ANSWERS && seen.during.length <= 2; more++) seen = await watched(since, more * LONG_ENOUGH);
+    const { together, during, rest } = seen;
     const moving = quantile(during, 0.5);
     const still = quantile(rest, 0.9);
     console.log(
@@ -107,7 +95,25 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     expect(during.length).toBeGreaterThan(2);
     expect(rest.length).toBeGreaterThan(2);
     expect(moving).toBeGreaterThan(3 * still + 1);
-  });
+  }, 300_000);
+
+  /** What was seen and heard since a moment, once she has spoken for so many ms. */
+  async function watched(since: number, ms: number): Promise<{ together: number; during: number[]; rest: number[] }> {
+    const { loudness } = await until(browser, (record) => spoken(record, since) > ms, 60_000);
+    const { sights, pictures } = await readMouth(browser.page);
+    const end = loudness.at(-1)!.at;
+    const before = sights.filter(({ at }) => at < end);
+    const together = correlation(before.map(({ at }) => heard(loudness, at)), before.map(({ speech }) => speech));
+    /** What changed in the pictures before which it was heard, or not, all of the time. */
+    const changes = (audible: boolean, before: number) =>
+      pictures
+        .filter(({ at }) => {
+          const levels = loudness.filter((one) => one.at > at - before && one.at < at);
+          return at < end && levels.length > 0 && levels.every(({ level }) => level > SILENCE === audible);
+        })
+        .map(({ change }) => change);
+    return { together, during: changes(true, 200), rest: changes(false, EASED) };
+  }
 });
 
 /** For how many ms the avatar was heard since a moment. */
