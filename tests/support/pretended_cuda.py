@@ -196,6 +196,8 @@ def pretended_cuda(monkeypatch, **changes: Any) -> Iterator[None]:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
     monkeypatch.setattr(torch.cuda, "synchronize", lambda *_: None)
+    stream = SimpleNamespace(is_capturing=lambda: False)  # Adam asks for it
+    monkeypatch.setattr(torch.accelerator, "current_stream", lambda *_: stream)
     monkeypatch.setattr(torch.cuda, "get_device_name", lambda *_: "Pretended")
     monkeypatch.setattr(torch.cuda, "reset_peak_memory_stats", lambda *_: None)
     monkeypatch.setattr(torch.cuda, "max_memory_allocated", lambda *_: PEAK)
