@@ -12,18 +12,12 @@ from ico3d.errors import CaptureError, SettingsError
 from ico3d.studio import recording
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.points import surface_points
-from ico3d.studio.recording import Recording, choose_views, record
+from ico3d.studio.recording import choose_views, record
 from support.needs import needs
 from support.recordings import synthetic_people
 from support.shared import SUBJECTS
 
 pytestmark = pytest.mark.slow
-
-
-def _settings(subject: Path, **changes) -> Recording:
-    values = dict(rig="head", cameras=3, frames=11, views_per_frame=1, size=40, text="", seed=3)
-    values |= dict(lively=False, fps=25.0, light="studio", motion="talk")
-    return Recording(str(subject), **(values | changes))
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +28,7 @@ def person(tmp_path_factory):
 @pytest.fixture(scope="module")
 def folder(person, tmp_path_factory):
     out = tmp_path_factory.mktemp("captures") / "one"
-    record(_settings(person), out, workers=2)
+    record(synthetic_people.small_recording(person), out, workers=2)
     return out
 
 
@@ -48,7 +42,7 @@ def _files(folder: Path) -> dict[str, bytes]:
 
 
 def test_the_same_settings_write_the_same_bytes(folder, person, tmp_path):
-    record(_settings(person), tmp_path / "again", workers=1)
+    record(synthetic_people.small_recording(person), tmp_path / "again", workers=1)
     assert _files(tmp_path / "again") == _files(folder)
 
 
@@ -63,16 +57,20 @@ def test_a_recording_that_was_cut_off_goes_on(folder, person, tmp_path, monkeypa
 
     monkeypatch.setattr(recording, "_write_png", fails)
     with pytest.raises(OSError, match="full"):
-        record(_settings(person), tmp_path / "cut", workers=1)
+        record(synthetic_people.small_recording(person), tmp_path / "cut", workers=1)
     with pytest.raises(CaptureError):
         open_capture(tmp_path / "cut")
     monkeypatch.setattr(recording, "_write_png", write)
-    record(_settings(person), tmp_path / "cut", workers=1)
+    record(synthetic_people.small_recording(person), tmp_path / "cut", workers=1)
     assert _files(tmp_path / "cut") == _files(folder)
 
 
 def test_another_seed_writes_other_frames(folder, person, tmp_path):
-    record(_settings(person, seed=4, frames=2, cameras=1), tmp_path / "other", workers=1)
+    record(
+        synthetic_people.small_recording(person, seed=4, frames=2, cameras=1),
+        tmp_path / "other",
+        workers=1,
+    )
     first, other = open_capture(folder), open_capture(tmp_path / "other")
     assert not np.allclose(first.world_from_head(0), other.world_from_head(0))
 
@@ -188,14 +186,14 @@ def test_sound_missing_is_told(copy):
 @pytest.mark.parametrize("changes", [{"views_per_frame": 4}, {"frames": 0}, {"rig": "dome"}])
 def test_settings_that_make_no_sense_are_refused(person, tmp_path, changes):
     with pytest.raises(SettingsError):
-        record(_settings(person, **changes), tmp_path / "x", workers=1)
+        record(synthetic_people.small_recording(person, **changes), tmp_path / "x", workers=1)
     assert not (tmp_path / "x").exists()
 
 
 def test_a_full_folder_is_not_overwritten(folder, person):
     before = _files(folder)
     with pytest.raises(SettingsError, match="holds something"):
-        record(_settings(person), folder, workers=1)
+        record(synthetic_people.small_recording(person), folder, workers=1)
     assert _files(folder) == before
 
 

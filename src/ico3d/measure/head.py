@@ -57,6 +57,8 @@ class HeadRenderer:
         if self._head.turn is not None:
             values = turn_values(self._head.turn, self._capture, [view.frame])  # (1, 3)
             expression = torch.cat([expression, values[0]])  # (B + 3,)
+        if self._shoulders is not None:
+            self._shoulders.motion(view.frame)  # looks at the picture, which is no drawing
         with self.watch.picture():
             gaussians = self._head.model(expression)
             if self._shoulders is not None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import Strands
 from ico3d.studio.person.subject import CARDS, Material, Subject
 
@@ -58,14 +59,9 @@ def surface_points(subject: Subject, count: int, seed: int) -> SurfacePoints:
     solid = ~np.isin(subject.materials, CARDS)
     faces, materials = subject.faces[solid], subject.materials[solid]
     corners = subject.vertices[faces].astype(float)  # (F, 3, 3)
-    sides = corners[:, 1:] - corners[:, :1]  # (F, 2, 3)
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)  # (F,)
-    weight = area * _density(subject, faces, materials)
+    weight = areas(corners) * _density(subject, faces, materials)
     hairs = 0 if subject.strands is None else round(HAIRS * count)
-    chosen = random.choice(len(faces), size=count - hairs, p=weight / weight.sum())
-    u, v = random.random((2, count - hairs, 1))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    parts = np.concatenate([1 - u - v, u, v], axis=1)
+    chosen, parts = scattered(weight, count - hairs, random)
     held = 1 if subject.strands is None else len(subject.strands.offsets)
     return SurfacePoints(
         faces[chosen], parts, subject.strands, random.choice(held, size=hairs, replace=hairs > held)

@@ -11,6 +11,7 @@ httpx2 = pytest.importorskip("httpx2")
 
 
 async def test_answers_are_short_and_plain(monkeypatch):
+    from ico3d.chat.services.bounded import EVENTS
     from ico3d.chat.tools import bounded_http
 
     monkeypatch.setattr(bounded_http, "MOST_BYTES", 1000)
@@ -29,7 +30,7 @@ async def test_answers_are_short_and_plain(monkeypatch):
     async with running(app) as port, httpx2.AsyncClient(transport=transport) as client:
         url = f"http://127.0.0.1:{port}"
         assert len((await client.get(f"{url}/1000")).content) == 1000
-        assert len((await client.get(f"{url}/2000?kind={bounded_http.EVENTS}")).content) == 2000
+        assert len((await client.get(f"{url}/2000?kind={EVENTS}")).content) == 2000
         with pytest.raises(httpx2.ReadError, match="more than 1000 bytes"):
             await client.get(f"{url}/1001")
         with pytest.raises(httpx2.ReadError, match="compressed"):
@@ -38,6 +39,7 @@ async def test_answers_are_short_and_plain(monkeypatch):
 
 
 async def test_events_come_no_faster_than_visitors_can_bear(monkeypatch):
+    from ico3d.chat.services.bounded import EVENTS
     from ico3d.chat.tools import bounded_http
 
     monkeypatch.setattr(bounded_http, "EVENTS_AT_ONCE", 20.0)
@@ -45,7 +47,7 @@ async def test_events_come_no_faster_than_visitors_can_bear(monkeypatch):
 
     @app.get("/{count}")
     async def events(count: int) -> Response:
-        return Response(b"event: message\ndata: {}\n\n" * count, media_type=bounded_http.EVENTS)
+        return Response(b"event: message\ndata: {}\n\n" * count, media_type=EVENTS)
 
     transport = bounded_http.BoundedTransport(trust_env=False)
     async with running(app) as port, httpx2.AsyncClient(transport=transport) as client:

@@ -8,17 +8,15 @@ import pytest
 from ico3d.capture.formats import open_capture
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import SettingsError
-from ico3d.studio.recording import Recording, record
+from ico3d.studio.recording import record
 from ico3d.studio.webcam.film import write_film
 from support.recordings import synthetic_people
 
 pytestmark = pytest.mark.slow
 
 
-def _settings(subject, **changes) -> Recording:
-    values = dict(rig="head", cameras=1, frames=6, views_per_frame=1, size=40, text="", seed=3)
-    values |= dict(lively=False, fps=25.0, light="studio", motion="talk")
-    return Recording(str(subject), **(values | changes))
+def _settings(subject, **changes):
+    return synthetic_people.small_recording(subject, **{"cameras": 1, "frames": 6, **changes})
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.studio.recording import Recording
+
 PARTS = [
     "skin",
     "lips",
@@ -101,3 +103,10 @@ def write_person(path: Path, **changes) -> Path:
     } | changes
     np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
     return path
+
+
+def small_recording(subject: Path, **changes) -> Recording:
+    """A recording of a head that takes a moment."""
+    values = dict(rig="head", cameras=3, frames=11, views_per_frame=1, size=40, text="", seed=3)
+    values |= dict(lively=False, fps=25.0, light="studio", motion="talk")
+    return Recording(str(subject), **(values | changes))

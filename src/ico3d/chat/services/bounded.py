@@ -17,25 +17,51 @@ async def ask_plain(request: httpx2.Request) -> None:
     request.headers["Accept-Encoding"] = PLAIN
 
 
+async def refuse_compressed(response: httpx2.Response) -> None:
+    """Closes an answer that is compressed all the same.
+
+    Raises:
+        ReadError: If it is.
+    """
+    if response.headers.get("Content-Encoding", PLAIN) != PLAIN:
+        await response.aclose()
+        raise httpx2.ReadError("its answer is compressed")
+
+
+def is_events(response: httpx2.Response) -> bool:
+    """Whether an answer is a stream of events."""
+    return response.headers.get("Content-Type", "").startswith(EVENTS)
+
+
 async def bound(response: httpx2.Response) -> None:
     """Has no more of an answer read than is allowed.
 
     Raises:
         ReadError: If the answer is compressed; while it is read, if it is too large.
     """
-    if response.headers.get("Content-Encoding", PLAIN) != PLAIN:
-        await response.aclose()
-        raise httpx2.ReadError("its answer is compressed")
-    lines = response.headers.get("Content-Type", "").startswith(EVENTS)
-    assert isinstance(response.stream, httpx2.AsyncByteStream)
-    response.stream = _Bounded(response.stream, lines)
+    await refuse_compressed(response)
+    response.stream = _Bounded(response.stream, is_events(response))
 
 
-class _Bounded(httpx2.AsyncByteStream):
+class Wrapped(httpx2.AsyncByteStream):
+    """The bytes of an answer; how many, those say that are made of it."""
+
+    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream):
+        """Takes an answer's own bytes."""
+        assert isinstance(stream, httpx2.AsyncByteStream)
+        self._stream = stream
+
+    async def aclose(self) -> None:
+        """Closes the answer."""
+        await self._stream.aclose()
+
+
+class _Bounded(Wrapped):
     """The bytes of an answer, up to `MOST_BYTES`; of its lines, up to `MOST_OF_LINE`."""
 
-    def __init__(self, stream: httpx2.AsyncByteStream, lines: bool):
-        self._stream, self._lines = stream, lines
+    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, lines: bool):
+        super().__init__(stream)
+        self._lines = lines
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
         size = line = 0
@@ -46,6 +72,3 @@ class _Bounded(httpx2.AsyncByteStream):
             if size > MOST_BYTES or (self._lines and line > MOST_OF_LINE):
                 raise httpx2.ReadError("its answer is too large")
             yield piece
-
-    async def aclose(self) -> None:
-        await self._stream.aclose()

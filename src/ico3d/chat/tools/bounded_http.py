@@ -5,11 +5,11 @@ from collections.abc import AsyncIterator
 
 import httpx2
 
+from ico3d.chat.services.bounded import Wrapped, ask_plain, is_events, refuse_compressed
 from ico3d.chat.supervision.allowance import Bucket
 
 MOST_BYTES = 4 << 20
 """Of an answer, which may be the list of all functions."""
-EVENTS = "text/event-stream"
 EVENT_RATE, EVENTS_AT_ONCE = 50.0, 1000.0
 """Events of a server per second for long, and at once: each costs the loop of all visitors time."""
 
@@ -32,29 +32,16 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
             ReadError: If the answer is compressed; while it is read, if it is large or has too many
                 events.
         """
-        request.headers["Accept-Encoding"] = "identity"
+        await ask_plain(request)
         response = await super().handle_async_request(request)
-        if response.headers.get("Content-Encoding", "identity") != "identity":
-            await response.aclose()
-            raise httpx2.ReadError("its answer is compressed")
-        streams = response.headers.get("Content-Type", "").startswith(EVENTS)
-        kind = _Paced(response.stream, self._events) if streams else _Bounded(response.stream)
-        response.stream = kind
+        await refuse_compressed(response)
+        paced = is_events(response)
+        stream = response.stream
+        response.stream = _Paced(stream, self._events) if paced else _Bounded(stream)
         return response
 
 
-class _Wrapped(httpx2.AsyncByteStream):
-    """The bytes of an answer."""
-
-    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream):
-        assert isinstance(stream, httpx2.AsyncByteStream)
-        self._stream = stream
-
-    async def aclose(self) -> None:
-        await self._stream.aclose()
-
-
-class _Bounded(_Wrapped):
+class _Bounded(Wrapped):
     """The bytes of an answer, up to `MOST_BYTES`."""
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
@@ -66,7 +53,7 @@ class _Bounded(_Wrapped):
             yield piece
 
 
-class _Paced(_Wrapped):
+class _Paced(Wrapped):
     """The bytes of a stream of events, as long as these do not come too fast."""
 
     def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, events: Bucket):

@@ -14,21 +14,21 @@ from torch import Tensor
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.region import CHIN, JAW_ENDS
 from ico3d.common.spread import spread
 from ico3d.head.portrait.neck import Neck, bent
 from ico3d.head.portrait.shift import Seen, shift
 from ico3d.head.views import PictureCache, View, head_pose
 from ico3d.splat.gaussians import Gaussians
 
-CHIN, EARS = 8, [0, 16]
-"""Multi-PIE landmarks of the chin, and where the jaw meets the ears."""
 COLUMN = 1.1
 """Width of what may be neck in a picture, relative to that of the jaw."""
 MOMENTS = 64
 """Number of frames over which the shoulders' place is averaged."""
 
-Look = Callable[[int], Seen | None]
-"""What the camera saw of the shoulders in a frame; None where it saw nothing."""
+Look = Callable[[int], tuple[np.ndarray, np.ndarray] | None]
+"""Brightness (H, W) of a frame's picture and the mask (H, W) of shoulders and neck in it; None
+where the camera saw none."""
 
 
 def neck_of(capture: Capture) -> Neck | None:
@@ -47,17 +47,17 @@ def neck_of(capture: Capture) -> Neck | None:
     landmarks = canonical_landmarks(capture)
     if landmarks is None:
         return None
-    middle = landmarks[EARS].mean(0)  # (3,)
+    ends = landmarks[list(JAW_ENDS)]  # (2, 3)
+    middle = ends.mean(0)  # (3,)
     x, y, z = (round(float(value), 6) for value in middle)
     reach = float(np.linalg.norm(landmarks[CHIN] - middle))
-    width = float(np.linalg.norm(np.diff(landmarks[EARS], axis=0)))
+    width = float(np.linalg.norm(ends[1] - ends[0]))
     return Neck((x, y, z), round(reach, 6), round(width, 6))
 
 
 def resting_place(capture: Capture) -> np.ndarray:
     """(4, 4) canonical head space to world, as the shoulders of a portrait lie on average."""
-    numbers = [f for f in spread(capture.num_frames, MOMENTS) if _has_pose(capture, f)]
-    poses = np.stack([head_pose(capture, frame) for frame in numbers])  # (M, 4, 4)
+    poses = np.stack([head_pose(capture, frame) for frame in _moments(capture)])  # (M, 4, 4)
     place = np.eye(4)
     place[:3, :3] = Rotation.from_matrix(poses[:, :3, :3]).mean().as_matrix()
     place[:3, 3] = poses[:, :3, 3].mean(0)
@@ -78,10 +78,14 @@ class Shoulders:
         self._capture, self._neck, self._look = capture, neck, look
         self._place = resting_place(capture)
         self._motions: dict[int, Tensor] = {}
-        self._metres = _middle_of(capture, neck)[1]  # per pixel
-        self._first = next((f for f in capture.split.train if _has_pose(capture, f)), None)
-        numbers = [f for f in spread(capture.num_frames, MOMENTS) if _has_pose(capture, f)]
-        self._mean = np.mean([self._shift(frame) for frame in numbers], axis=0)  # (2,)
+        camera, middle = capture.cameras[0], self._place @ [*neck.middle, 1.0]  # (4,)
+        pixel, depth = camera.project(middle[:3])  # (2,), ()
+        self._metres = float(depth / camera.intrinsics[0, 0])  # per pixel
+        away = np.abs(np.arange(camera.width) - pixel[0])  # (W,)
+        self._column = away < COLUMN * neck.width / 2 / self._metres  # (W,) where the neck may be
+        first = next((f for f in capture.split.train if _has_pose(capture, f)), None)
+        self._first = None if first is None else self._seen(first)
+        self._mean = np.mean([self._shift(frame) for frame in _moments(capture)], axis=0)  # (2,)
 
     def posed(self, gaussians: Gaussians, frame: int) -> Gaussians:
         """Gaussians in canonical head space, with the shoulders where they are in a frame."""
@@ -105,8 +109,16 @@ class Shoulders:
         """(2,) pixels by which the shoulders lie beside those of the first frame; 0 if unseen."""
         if self._first is None:
             return np.zeros(2)
-        first, now = self._look(self._first), self._look(frame)
-        return np.zeros(2) if first is None or now is None else shift(first, now)
+        now = self._seen(frame)
+        return np.zeros(2) if now is None else shift(self._first, now)
+
+    def _seen(self, frame: int) -> Seen | None:
+        """The shoulders in a frame's picture."""
+        looked = self._look(frame)
+        if looked is None:
+            return None
+        grey, mask = looked
+        return Seen(grey, mask, np.broadcast_to(self._column, mask.shape))
 
 
 def shoulders_of(capture: Capture, neck: Neck | None, pictures: PictureCache) -> Shoulders | None:
@@ -123,26 +135,20 @@ def shoulders_of(capture: Capture, neck: Neck | None, pictures: PictureCache) ->
     if neck is None or neck_of(capture) is None:
         return None
 
-    (middle, metres), camera = _middle_of(capture, neck), capture.cameras[0]
-    away = np.abs(np.arange(camera.width) - middle)  # (W,)
-    column = np.tile(away < COLUMN * neck.width / 2 / metres, (camera.height, 1))  # (H, W)
-
-    def look(frame: int) -> Seen | None:
+    def look(frame: int) -> tuple[np.ndarray, np.ndarray] | None:
         if not capture.has_image(0, frame) or not capture.has_mask(0, frame):
             return None
         picture = pictures.picture(View(0, frame, capture.cameras[0]), torch.device("cpu"))
         if picture.torso is None:
             return None
-        return Seen(picture.image.mean(-1).numpy(), picture.torso.numpy(), column)
+        return picture.image.mean(-1).numpy(), picture.torso.numpy()
 
     return Shoulders(capture, neck, look)
 
 
-def _middle_of(capture: Capture, neck: Neck) -> tuple[float, float]:
-    """Column in pixels where the middle of the head is on average, and metres per pixel there."""
-    camera, middle = capture.cameras[0], resting_place(capture) @ [*neck.middle, 1.0]  # (4,)
-    pixel, depth = camera.project(middle[:3])  # (2,), ()
-    return float(pixel[0]), float(depth / camera.intrinsics[0, 0])
+def _moments(capture: Capture) -> list[int]:
+    """Frames with a head pose, spread over the recording."""
+    return [frame for frame in spread(capture.num_frames, MOMENTS) if _has_pose(capture, frame)]
 
 
 def _has_pose(capture: Capture, frame: int) -> bool:

@@ -5,6 +5,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import KDTree
 
 from ico3d.studio.person.growing.styles import smooth, unit
+from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import Strands, bound
 from ico3d.studio.person.subject import Material, Subject
 
@@ -106,13 +107,10 @@ def _on_cards(
     uv = subject.corner_uv[chosen].astype(float)  # (F, 3, 2)
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    area = np.linalg.norm(np.cross(e1, e2), axis=1)
+    area = areas(corners)  # (F,)
     determinant = d1[:, 0] * d2[:, 1] - d2[:, 0] * d1[:, 1]
     area[np.abs(determinant) < 1e-12] = 0
-    f = random.choice(len(chosen), size=count, p=area / area.sum())
-    v, w = random.random((2, count))
-    v, w = np.where(v + w > 1, 1 - v, v), np.where(v + w > 1, 1 - w, w)
-    parts = np.stack([1 - v - w, v, w], 1)
+    f, parts = scattered(area, count, random)
     inverse = 1 / determinant[f, None]
     return (
         subject.faces[chosen[f]],

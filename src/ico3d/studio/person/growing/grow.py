@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 
 from ico3d.studio.person.growing import face, styles
 from ico3d.studio.person.growing.skull import Skull, skull_of
+from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import Strands, bound, joined
 from ico3d.studio.person.subject import CARDS, Material, Subject
 from ico3d.studio.raster import vertex_normals
@@ -119,11 +120,7 @@ def _roots(
     middle = subject.vertices[skin].mean(axis=1)
     skin = skin[skull.inside_hairline(middle) > -0.015]
     at = subject.vertices[skin].astype(float)  # (F, 3, 3)
-    area = np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
-    chosen = random.choice(len(skin), size=2 * count, p=area / area.sum())
-    u, v = random.random((2, 2 * count))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    parts = np.stack([1 - u - v, u, v], 1)
+    chosen, parts = scattered(areas(at), 2 * count, random)
     places = np.einsum("nk,nkc->nc", parts, at[chosen])
     depth = skull.inside_hairline(places) + 0.004 * _ripple(places)
     dense = np.clip(0.35 + depth / EDGE, 0, 1) ** 1.5  # (2 count,)

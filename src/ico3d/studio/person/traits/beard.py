@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ico3d.studio.person.growing.styles import clumped, unit, waves
+from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import bound, joined
 from ico3d.studio.person.subject import Material, Subject
 from ico3d.studio.raster import vertex_normals
@@ -88,12 +89,8 @@ def _roots(subject: Subject, random: np.random.Generator) -> tuple[np.ndarray, n
     bare = nose | (z < marks[0, 2] - 0.02)
     skin = subject.faces[subject.materials == Material.SKIN]
     skin = skin[(share * ~bare)[skin].min(axis=1) > 0.05]
-    at = subject.vertices[skin].astype(float)  # (F, 3, 3)
-    area = np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
-    chosen = random.choice(len(skin), size=3 * HAIRS, p=area / area.sum())
-    u, v = random.random((2, 3 * HAIRS))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    parts = np.stack([1 - u - v, u, v], 1)
+    area = areas(subject.vertices[skin].astype(float))  # (F,)
+    chosen, parts = scattered(area, 3 * HAIRS, random)
     dense = np.einsum("nk,nk->n", parts, share[skin[chosen]]) ** 1.5
     kept = np.flatnonzero(random.random(3 * HAIRS) < dense)[:HAIRS]
     return skin[chosen[kept]], parts[kept]
