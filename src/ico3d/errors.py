@@ -1,11 +1,41 @@
 """Errors that a user can cause. Each carries one clear sentence: what, where, what to do."""
 
+from collections.abc import Mapping
+from typing import Self
+
+from ico3d.failures import FAILURES
+
 MOST_LETTERS = 1000
 """Length of a sentence, beyond which its middle is left out."""
 
 
 class Ico3dError(Exception):
-    """Base of every error the command line prints as one sentence, without a traceback."""
+    """Base of every error the command line prints as one sentence, without a traceback.
+
+    Attributes:
+        code: Name of what happened in `FAILURES`, by which a page finds it in its own languages;
+            empty where it has no name.
+        values: What stands in that text, by its name there.
+    """
+
+    code: str = ""
+    values: Mapping[str, float | str] = {}
+
+    @classmethod
+    def of(
+        cls, code: str, before: str = "", after: str = "", values: Mapping[str, float | str] = {}
+    ) -> Self:
+        """An error that a page can tell in its own languages.
+
+        Args:
+            code: Name of its text in `FAILURES`.
+            before: What a terminal shows before that text, such as the name of a file.
+            after: What a terminal shows behind it.
+            values: What stands in the text.
+        """
+        error = cls(f"{before}{FAILURES[code].format(**values)}{after}")
+        error.code, error.values = code, values
+        return error
 
     def __str__(self) -> str:
         """The sentence, on one line, of bounded length, without characters that a terminal obeys.

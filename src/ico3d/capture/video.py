@@ -86,7 +86,7 @@ class Video:
                 count += 1
             before = now
         if before is None:
-            raise CaptureError(f"{self.path}: no picture can be decoded; is the file damaged?")
+            raise CaptureError.of("no-picture", f"{self.path}: ")
         if count / fps <= before[0] + 0.5 / fps:
             yield before[1], _is_near(count / fps, before[0], fps)
 
@@ -105,7 +105,7 @@ class Video:
                 seconds = frame.time if frame.time is not None else (first or 0.0) + self.decoded
                 first = seconds if first is None else first
                 if seconds - first > RECORDING:
-                    raise CaptureError(f"{self.path}: is longer than {RECORDING:g} s.")
+                    raise CaptureError.of("long", f"{self.path}: ", values={"n": round(RECORDING)})
                 self.times.append(seconds - first)
                 yield self.times[-1], self._picture(frame)
 
@@ -154,23 +154,23 @@ def open_video(path: Path, size: int) -> Video:
     from av.error import FFmpegError
 
     if not path.is_file():
-        raise CaptureError(f"there is no video file at {path}.")
+        raise CaptureError.of("gone", f"{path}: ")
     try:
         with opened(path) as container:
             if not container.streams.video:
-                raise CaptureError(f"{path} holds no video stream.")
+                raise CaptureError.of("streamless", f"{path}: ")
             stream = container.streams.video[0]
             if stream.codec_context is None:
-                raise CaptureError(f"{path}: its video is of a kind that cannot be decoded here.")
+                raise CaptureError.of("kind", f"{path}: ")
             _limit(stream)
             width, height = stream.codec_context.width, stream.codec_context.height
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1
             announced, rate = stream.frames, float(stream.average_rate or 0)
     except (FFmpegError, OSError) as error:
-        raise CaptureError(f"{path} cannot be decoded as a video: {error}.") from error
+        raise CaptureError.of("decoding", f"{path}: ", f" ({error})") from error
     if frame is None or width * height == 0:
-        raise CaptureError(f"{path}: no picture can be decoded; is the file damaged?")
+        raise CaptureError.of("no-picture", f"{path}: ")
     scale = min(1.0, size / min(width, height))
     width, height = round(width * scale), round(height * scale)
     return Video(path, *((height, width) if turned else (width, height)), scale, announced, rate)

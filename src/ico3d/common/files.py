@@ -68,9 +68,10 @@ def full_disk(path: Path) -> Generator[None]:
     except OSError as error:
         if error.errno not in FULL:
             raise
-        raise StorageError(
-            f"{path} cannot be written, as the disk is full ({error.strerror}): free some space "
-            "and run the same command again; what was there before is kept."
+        raise StorageError.of(
+            "disk-full",
+            f"{path} cannot be written, as ",
+            f" Run the same command again; what was there before is kept ({error.strerror}).",
         ) from error
 
 

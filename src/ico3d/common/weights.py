@@ -75,7 +75,9 @@ def model_file(name: str, purpose: str) -> Path:
     found = find_model(name)
     if found is not None:
         return found
-    raise MissingModelError(f"{purpose} needs the model file '{name}': {how_to_get(name)}")
+    get = how_to_get(name)
+    advice = f" {get[0].upper()}{get[1:]}"
+    raise MissingModelError.of("model", f"{purpose} cannot begin: ", advice, {"file": name})
 
 
 def model_of(name: str) -> Path:

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.examine import Examination
 
 Step = Literal["look", "track", "learn", "measure", "bake"]
@@ -28,11 +29,11 @@ class Voiced:
 
     Attributes:
         seconds: Seconds of speech from which it was cloned; 0 where it was not.
-        why: Why it was not, a sentence; empty where it was.
+        why: Why it was not; None where it was.
     """
 
     seconds: float
-    why: str = ""
+    why: Advice | None = None
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,5 @@ def check_room(folder: Path, quality: Quality, found: Examination) -> None:
     needed = BYTES * max(everything / 2, pictures_of(quality, found)) + SPARE
     free = shutil.disk_usage(folder).free
     if free < needed:
-        raise StorageError(
-            f"the disk of {folder} has {free / 1e9:.1f} GB left and {needed / 1e9:.1f} GB are "
-            "needed: free some space and run the same command again."
-        )
+        sizes = {"free": round(free / 1e9, 1), "needed": round(needed / 1e9, 1)}
+        raise StorageError.of("disk-room", f"{folder}: ", " Run the same command again.", sizes)

@@ -4,7 +4,6 @@ from PIL import Image
 from rich.console import Console
 
 from ico3d.creating.events import Event, Looked, Made, Planned, Preview, Step, Voiced
-from ico3d.creating.looking.advice import Advice
 from ico3d.creating.settings import CreateSettings
 
 NAMES: dict[Step, str] = {
@@ -70,7 +69,7 @@ def _of_video(looked: Looked) -> list[str]:
 
 def _of_voice(voiced: Voiced) -> str:
     if voiced.why:
-        said = Advice("voice", values={"why": voiced.why}).text
+        said = str(voiced.why)
         return said[0].upper() + said[1:]
     return f"The avatar's voice is cloned from {voiced.seconds:.0f} s of clean speech."
 

@@ -15,6 +15,7 @@ from ico3d.bundle.people.voice import VOICE as TONE
 from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import plain
+from ico3d.creating.looking.advice import Advice
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import SettingsError, StorageError
 from ico3d.training.notes.state import begun, ended, note
@@ -59,20 +60,20 @@ class Workplace:
     def voice(self, settings: CreateSettings) -> dict | None:
         """What is known of the voice that was cloned by the same consent; None where none was."""
         known = self.read(f"{VOICE}/{VOICE_ABOUT}") or {}
-        whole = known.get("fault") or self.voice_file(TONE).is_file()
+        whole = isinstance(known.get("fault"), dict) or self.voice_file(TONE).is_file()
         return known if whole and known.get("consent") == settings.voice_consent else None
 
     def voice_file(self, name: str) -> Path:
         """A file about the cloned voice."""
         return self.file(VOICE) / name
 
-    def note_voice(self, settings: CreateSettings, seconds: float, fault: str) -> dict:
+    def note_voice(self, settings: CreateSettings, seconds: float, fault: Advice | None) -> dict:
         """Notes from how many seconds of speech a voice was cloned, or why it cannot be."""
         known = {
             "likeness": settings.out.stem,
             "consent": settings.voice_consent,
             "seconds": seconds,
-            "fault": fault,
+            "fault": fault and {"code": fault.code, "values": dict(fault.values)},
         }
         self.write(f"{VOICE}/{VOICE_ABOUT}", known)
         return known
@@ -116,7 +117,7 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise SettingsError(f"{out} is being made just now, by another process.") from error
+            raise SettingsError.of("busy", f"{out}: ") from error
         place = Workplace(folder, _digest(settings.video))
         _check_same(place, settings)
         for left in folder.glob(".capture-*"):

@@ -101,9 +101,10 @@ class HeadDensity:
             self._stats, model.log_scales.exp(), seen.opacities, thresholds, seen.contributions
         )
         if len(plan) == 0:
-            raise ModelError(
-                f"all Gaussians have faded by step {step}: lower --rates.mlp, or "
-                "give the capture masks and raise --loss.alpha."
+            raise ModelError.of(
+                "faded",
+                after=" Lower --rates.mlp, or give the capture masks and raise --loss.alpha.",
+                values={"step": step},
             )
         generator = torch.Generator().manual_seed(hash((self._seed, step)) % 2**63)
         _carry_out(plan, model, optimiser, generator)

@@ -19,10 +19,9 @@ def device_failure(error: RuntimeError, step: int, saved: int) -> DeviceError | 
     again = f"run the same command again, and it goes on from step {saved}"
     said = str(error).strip().partition("\n")[0]
     if isinstance(error, torch.OutOfMemoryError):
-        return DeviceError(
-            f"the GPU's memory ran out at step {step}: end other programs that use the GPU and "
-            f"{again}, or start afresh with fewer --density.max-gaussians."
-        )
+        fewer = f" Then {again}, or start afresh with fewer --density.max-gaussians."
+        return DeviceError.of("gpu-memory", after=fewer, values={"step": step})
     if isinstance(error, torch.AcceleratorError) or any(sign in said for sign in SIGNS):
-        return DeviceError(f"the GPU failed at step {step} ({said}): {again}.")
+        after = f" It said: {said}. Now {again}."
+        return DeviceError.of("gpu-failed", after=after, values={"step": step})
     return None

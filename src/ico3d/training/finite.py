@@ -23,10 +23,11 @@ class NotFiniteError(ModelError):
 
     def at(self, step: int, saved: int) -> ModelError:
         """The error for the user; the run's latest checkpoint was written after step `saved`."""
-        return ModelError(
-            f"{self.what} is not finite at step {step}: look for damaged frames with ico3d "
-            f"capture check and run the same command again (it goes on from step {saved}), "
-            "or start afresh with lower learning rates."
+        return ModelError.of(
+            "diverged",
+            f"{self.what} is not finite at step {step}: ",
+            " Look for these with ico3d capture check and run the same command again (it goes on "
+            f"from step {saved}), or start afresh with lower learning rates.",
         )
 
 

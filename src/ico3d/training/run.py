@@ -104,10 +104,11 @@ class RunFolder:
                 )
             return found
         if faults:
-            raise ModelError(
-                f"{faults[0]} There is no other checkpoint that can be used in {self.path}: put a "
-                f"copy of {CHECKPOINT} there, or move the damaged ones away to begin afresh; "
-                "nothing was removed."
+            raise ModelError.of(
+                "checkpoint",
+                f"{faults[0]} There is no other checkpoint that can be used in {self.path}: ",
+                f" Put a copy of {CHECKPOINT} there, or move the damaged ones away to begin "
+                "afresh; nothing was removed.",
             )
         return None
 

@@ -8,6 +8,7 @@ export interface Advice {
   code: string;
   values: Record<string, string | number>;
   spans: [first: number, last: number][]; // s
+  detail?: string; // in English, for whoever looks after the machine
 }
 
 /** Advice in the words of the page; a sentence that was kept by an earlier version stays as it is. */
@@ -32,10 +33,23 @@ export function together(sentences: readonly Sentence[]): Sentence {
 export function showAdvice(list: HTMLElement, words: PageWords, advice: readonly (Advice | string)[]): void {
   const rows = advice.map((one) => {
     const row = document.createElement('li');
-    words.write(row, adviceOf(one));
+    const said = row.appendChild(document.createElement('span'));
+    words.write(said, adviceOf(one));
+    if (typeof one !== 'string' && one.detail) row.append(detailOf(words, one.detail));
     return row;
   });
   list.replaceChildren(...rows);
+}
+
+/** What is told besides, in English, behind a line that opens it. */
+function detailOf(words: PageWords, text: string): HTMLDetailsElement {
+  const details = document.createElement('details');
+  const summary = details.appendChild(document.createElement('summary'));
+  words.write(summary, say('studio.making.detail'));
+  const shown = details.appendChild(document.createElement('p'));
+  shown.lang = 'en';
+  shown.textContent = text;
+  return details;
 }
 
 function spanOf(first: number, last: number): string {

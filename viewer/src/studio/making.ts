@@ -2,11 +2,13 @@ import { every } from '../lifetime.ts';
 import { byId } from '../ui/elements.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say, type Key, type Sentence } from '../words/text.ts';
-import { adviceOf, showAdvice, together } from './advice.ts';
+import { showAdvice } from './advice.ts';
 import { madeOf } from './bodies.ts';
+import { failureOf, type Failure } from './failure.ts';
 import type { Making, Recordings, Status } from './recordings.ts';
 
 const STEPS = ['join', 'look', 'track', 'learn', 'measure', 'bake'] as const;
+const NONE: Failure = { sentence: '', detail: '' };
 const ASKED = 1500; // ms between two questions how far it is
 
 /** What the view of the making needs of the page around it. */
@@ -113,13 +115,12 @@ export class MakingView {
     showAdvice(byId(root, 'betters'), words, advice);
   }
 
-  /** Says why it failed: of the video in the words of the page, of all else in English. */
+  /** Says why it failed in the words of the page, with what is in English alone behind a line that opens it. */
   private showError(making: Making | null): void {
-    const shown = byId(this.root, 'error');
-    const ofVideo = making?.refused ?? [];
-    shown.lang = ofVideo.length > 0 ? this.ports.words.language : 'en';
-    const isTold = making?.state === 'failed';
-    this.ports.words.write(shown, !isTold ? '' : ofVideo.length > 0 ? together(ofVideo.map(adviceOf)) : making.error);
+    const { sentence, detail } = making?.state === 'failed' ? failureOf(making, canGoOn(making)) : NONE;
+    this.ports.words.write(byId(this.root, 'error'), sentence);
+    byId(this.root, 'detail').hidden = detail === '';
+    byId(this.root, 'technical').textContent = detail;
   }
 
   private entry(step: (typeof STEPS)[number], number: number, making: Making): HTMLLIElement {

@@ -1,6 +1,6 @@
 import { PageError } from '../errors.ts';
 import type { Server } from '../server.ts';
-import { isKey, say } from '../words/text.ts';
+import { isKey, say, type Key, type Message } from '../words/text.ts';
 import { adviceOf, together, type Advice } from './advice.ts';
 
 /** One part of a recording, as the server tells it. */
@@ -11,6 +11,12 @@ export interface Part {
   take?: string; // of a part that broke off
   seconds?: number;
   advice?: (Advice | string)[];
+}
+
+/** What a part is called on the page. */
+export function partName(id: string): Message {
+  const number = /^text-(\d+)$/.exec(id)?.[1];
+  return number ? say('studio.part.text', { n: Number(number) }) : say(`studio.part.${id}` as Key);
 }
 
 /** Ways to turn the head. */
@@ -27,7 +33,9 @@ export interface Making {
   advice: (Advice | string)[];
   refused: Advice[]; // why nothing can be made of the video
   faces: number; // pictures of the face so far
-  error: string; // in English
+  error: string; // why it failed, in English
+  code?: string; // of what happened, if somebody foresaw it; earlier versions had none
+  values?: Record<string, string | number>; // what stands in its sentence
   decibels: number | null;
   changed: ('parts' | 'on')[]; // what is another since: the recordings, the body
 }

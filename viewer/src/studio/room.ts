@@ -5,7 +5,7 @@ import { showAdvice } from './advice.ts';
 import { Camera } from './camera.ts';
 import { Bodies, type BodyPorts } from './bodies.ts';
 import { showMeters, soundsOf } from './meters.ts';
-import { type Overview, type Part, type Status, type Told, type Turns } from './recordings.ts';
+import { partName, type Overview, type Part, type Status, type Told, type Turns } from './recordings.ts';
 import { Sending } from './sending.ts';
 
 const LOOKED = 400; // ms between two pictures for guidance
@@ -352,8 +352,7 @@ export class Room {
   private entry(part: Part): HTMLLIElement {
     const { words } = this.ports;
     const [row, button, name, state] = (['li', 'button', 'span', 'span'] as const).map((tag) => document.createElement(tag));
-    const number = /^text-(\d+)$/.exec(part.id)?.[1];
-    words.write(name!, number ? say('studio.part.text', { n: Number(number) }) : say(`studio.part.${part.id}` as Key));
+    words.write(name!, partName(part.id));
     const shown = part.advice?.length ? 'better' : part.state;
     words.write(state!, say(`studio.state.${shown}`, part.seconds === undefined ? undefined : { n: Math.round(10 * part.seconds) / 10 }));
     button!.dataset.part = part.id;

@@ -89,10 +89,7 @@ def read_faces(
             save_landmarks(work / "ori_imgs" / f"{number}.lms", face.landmarks[MULTI_PIE])
         readings.names = reader.names
     if not readings.frames:
-        raise CaptureError(
-            f"{video.path}: no face in any of its {readings.total} frames; "
-            "a portrait needs one person facing the camera."
-        )
+        raise CaptureError.of("faceless", f"{video.path}: ", values={"n": readings.total})
     return readings
 
 

@@ -21,12 +21,14 @@ class Advice:
         level: `refused` if nothing can be made of the video as it is.
         values: What stands in the text.
         spans: Seconds (first, last) where it is so; none where it is so all along.
+        detail: What whoever looks after the machine may want to know besides, in English.
     """
 
     code: str
     level: Level = "better"
     values: Values = field(default_factory=dict)
     spans: tuple[tuple[float, float], ...] = ()
+    detail: str = ""
 
     @property
     def topic(self) -> str:
@@ -39,8 +41,9 @@ class Advice:
         return TEXTS[self.code].format(**self.values)
 
     def __str__(self) -> str:
-        """The text with the seconds before it."""
-        return f"{when(self.spans)}: {self.text}" if self.spans else self.text
+        """The text with the seconds before it and the detail behind it."""
+        seconds = f"{when(self.spans)}: " if self.spans else ""
+        return f"{seconds}{self.text} {self.detail}".rstrip()
 
 
 def spans_of(seconds: Sequence[float], apart: float) -> tuple[tuple[float, float], ...]:

@@ -61,7 +61,7 @@ def examine(path: Path, size: int, reached: Callable[[float], None]) -> Examinat
     video = open_video(path, size)
     samples = sampled(video, reached)
     if video.decoded < 2:
-        raise CaptureError(_photograph(path))
+        raise CaptureError.of("photograph", f"{path} is ")
     seconds = video.times[-1] - video.times[0]
     found = [
         *_of_file(video, seconds),
@@ -83,14 +83,7 @@ def refuse_photograph(path: Path) -> None:
             pass
     except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError):
         return  # no picture that Pillow knows
-    raise CaptureError(_photograph(path))
-
-
-def _photograph(path: Path) -> str:
-    return (
-        f"{path} is a photograph: one picture shows neither the sides of a head nor how its mouth "
-        "moves with the voice; film yourself talking for half a minute, and give that video."
-    )
+    raise CaptureError.of("photograph", f"{path} is ")
 
 
 def _rate(video: Video) -> float:

@@ -78,5 +78,20 @@ TEXTS: dict[str, str] = {
         "the head turns up and down by {n}° in all: look slowly up and down while you talk, as the "
         "avatar is blurred where it was not seen."
     ),
-    "voice": "the avatar is made without a voice of its own: {why}",
+    "voice-failed": "the avatar is made without a voice of its own: cloning it did not work here.",
+    "voice-lacking": (
+        "the avatar is made without a voice of its own: OpenVoice, which imitates voices, is not "
+        "installed here, or not all of it."
+    ),
+    "voice-noisy": (
+        "the avatar is made without a voice of its own: {n} s of speech are free of noise and "
+        "clipping, and {least} s are needed: find a quiet room, and do not come too close to the "
+        "microphone."
+    ),
+    "voice-none": "the avatar is made without a voice of its own: the recording has no sound.",
+    "voice-short": (
+        "the avatar is made without a voice of its own: {n} s of speech are heard, and {least} s "
+        "are needed: talk more."
+    ),
+    "voice-silent": "the avatar is made without a voice of its own: the recording is silent.",
 }

@@ -15,6 +15,7 @@ from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import is_stated
 from ico3d.common.sound import wav_bytes
 from ico3d.creating.events import Tell, Voiced
+from ico3d.creating.looking.advice import Advice
 from ico3d.creating.settings import CreateSettings
 from ico3d.creating.workplace import Workplace
 from ico3d.errors import BundleError, MissingModelError, SettingsError
@@ -59,13 +60,13 @@ def clone(settings: CreateSettings, place: Workplace, tell: Tell) -> Cloned | No
     known = place.voice(settings)
     if known is None:
         if lacking := hindrance():
-            return _without(lacking + LATER, tell)
+            return _without(Advice("voice-lacking", detail=lacking + LATER), tell)
         try:
             known = _made(settings, place)
         except (BundleError, MissingModelError, SettingsError) as error:
-            return _without(f"{error}{LATER}", tell)
+            return _without(Advice("voice-failed", detail=f"{error}{LATER}"), tell)
     if known["fault"]:
-        return _without(known["fault"], tell)
+        return _without(Advice(**known["fault"]), tell)
     tell(Voiced(known["seconds"]))
     return Cloned(voice_from_bytes(place.voice_file(VOICE).read_bytes()), about)
 
@@ -105,5 +106,5 @@ def heard(samples: np.ndarray, tell: Callable[[Path], np.ndarray]) -> np.ndarray
         return tell(path)
 
 
-def _without(why: str, tell: Tell) -> None:
+def _without(why: Advice, tell: Tell) -> None:
     tell(Voiced(0.0, why))

@@ -8,6 +8,7 @@ import soxr
 from ico3d.capture.capture import Sound
 from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
+from ico3d.creating.looking.advice import Advice
 from ico3d.creating.looking.sound_checks import ABOVE_NOISE, SILENT, clips, loudness
 
 FRAME = 512
@@ -33,12 +34,12 @@ class Speech:
     Attributes:
         samples: (S,) float32 the stretches one behind the other, equally loud.
         seconds: Seconds of speech in them.
-        fault: Why they cannot tell a voice, a sentence; empty where they can.
+        fault: Why they cannot tell a voice; None where they can.
     """
 
     samples: np.ndarray
     seconds: float
-    fault: str = ""
+    fault: Advice | None = None
 
 
 def clean_speech(sound: Sound | None) -> Speech:
@@ -48,22 +49,17 @@ def clean_speech(sound: Sound | None) -> Speech:
         sound: Sound of the recording; None where it has none.
     """
     if sound is None or not len(sound.samples):
-        return _none("the recording has no sound.")
+        return _none("voice-none")
     found = stretches(is_speech(sound), FRAME / MICROPHONE_RATE)
     heard = sum(end - begin for begin, end in found)
     if heard < LEAST:
         if loudness(sound.samples) < SILENT:
-            return _none("the recording is silent.")
-        return _none(
-            f"{int(heard)} s of speech are heard, and {LEAST:.0f} s are needed: talk more."
-        )
+            return _none("voice-silent")
+        return _none("voice-short", heard)
     clean = _cleanest(sound, found)
     seconds = sum(end - begin for begin, end in clean)
     if seconds < LEAST:
-        return _none(
-            f"{int(seconds)} s of speech are free of noise and clipping, and {LEAST:.0f} s are "
-            "needed: find a quiet room, and do not come too close to the microphone."
-        )
+        return _none("voice-noisy", seconds)
     pause = np.zeros(round(APART * sound.rate), np.float32)
     pieces = [part for span in clean for part in (_levelled(_cut(sound, span), sound.rate), pause)]
     return Speech(np.concatenate(pieces), seconds)
@@ -131,5 +127,7 @@ def _levelled(samples: np.ndarray, rate: int) -> np.ndarray:
     return (samples * gain * fade * fade[::-1]).astype(np.float32)
 
 
-def _none(fault: str) -> Speech:
-    return Speech(np.zeros(0, np.float32), 0.0, fault)
+def _none(code: str, seconds: float | None = None) -> Speech:
+    """No speech, and the advice of that code; `seconds` are those that there are of it, if told."""
+    told = {} if seconds is None else {"n": int(seconds), "least": round(LEAST)}
+    return Speech(np.zeros(0, np.float32), 0.0, Advice(code, values=told))

@@ -13,6 +13,8 @@ import threading
 from collections.abc import Sequence
 from typing import IO
 
+FULL_DISK = 74
+"""Exit status of a process that ends because the disk is full, and may not be able to note it."""
 PATIENCE = 5.0
 """Seconds in which a process may end by itself before it is killed."""
 

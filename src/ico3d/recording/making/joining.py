@@ -36,10 +36,8 @@ def join(files: Sequence[Path], out: Path) -> None:
     size = _even(videos[0])
     for video in videos[1:]:
         if abs(video.width * size[1] / (video.height * size[0]) - 1) > SAME:
-            raise CaptureError(
-                f"{video.path.name} has another shape than {videos[0].path.name}: record it again, "
-                "with the camera held as before."
-            )
+            names = {"part": video.path.name, "first": videos[0].path.name}
+            raise CaptureError.of("shape", values=names)
     counts = [sum(1 for _ in video.frames(FPS)) for video in videos]
     sound = np.concatenate([_sound(v.path, n) for v, n in zip(videos, counts, strict=True)])
     pictures = (picture for video in videos for picture in _scaled(video, size))

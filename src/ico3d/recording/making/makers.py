@@ -2,6 +2,7 @@
 
 import contextlib
 import shutil
+import signal
 import subprocess
 import threading
 from dataclasses import dataclass, replace
@@ -11,10 +12,11 @@ from typing import Any, cast
 from ico3d.bundle.packaged import NAME
 from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.errors import StorageError
+from ico3d.failures import FAILURES
 from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import Person
-from ico3d.recording.making.beside import start, stop
+from ico3d.recording.making.beside import FULL_DISK, start, stop
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, begun, read_progress, write_progress
 from ico3d.recording.making.sources import signature, sources
@@ -22,6 +24,8 @@ from ico3d.recording.refusals import Refused
 
 WORKER = "ico3d.recording.making.worker"
 LOG = "log.txt"
+ENDS = {-signal.SIGKILL: "killed", FULL_DISK: "disk-full"}
+"""Why a process has ended that could not write it down, by its exit status."""
 
 
 @dataclass(frozen=True)
@@ -123,12 +127,12 @@ class Makers:
         folder = Places(person.folder).folder
         with self._lock:
             process = self._running.get(person.name)
-            ended = None if process is None else process.poll()
+            status = None if process is None else process.poll()
         found = read_progress(folder)
-        if found is None or found.state != "running" or (process is not None and ended is None):
+        if found is None or found.state != "running" or (process is not None and status is None):
             return found
-        why = "the making has ended unexpectedly: begin again, it goes on where it was."
-        failed = replace(found, state="failed", left=None, error=why)
+        code = ENDS.get(status or 0, "ended")
+        failed = replace(found, state="failed", left=None, error=FAILURES[code], code=code)
         with contextlib.suppress(StorageError):  # that may be why
             write_progress(folder, failed)
         return failed

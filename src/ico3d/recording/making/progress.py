@@ -35,7 +35,9 @@ class Progress:
         advice: What would make it better, each as `plain` writes an `Advice`.
         refused: Why nothing can be made of the video, likewise; empty where something can.
         faces: Number of pictures of the face that have been shown.
-        error: Why it failed; empty where it did not.
+        error: Why it failed, in English; empty where it did not.
+        code: Name of why it failed in `FAILURES`; empty where nobody foresaw it.
+        values: What stands in that text.
         decibels: How good it is on pictures that it never saw; None where that is not known.
         made_of: What tells the recording and the body of which it is made from others.
     """
@@ -49,6 +51,8 @@ class Progress:
     refused: tuple[dict[str, Any], ...] = ()
     faces: int = 0
     error: str = ""
+    code: str = ""
+    values: dict[str, float | str] = field(default_factory=dict)
     decibels: float | None = None
     made_of: dict[str, Any] = field(default_factory=dict)
 
@@ -107,8 +111,7 @@ class Reporter:
             found = event.found.advice
             self.change(advice=_of(found, "better"), refused=_of(found, "refused"))
         elif isinstance(event, Voiced) and event.why:
-            without = plain(Advice("voice", values={"why": event.why}))
-            self.change(advice=(*self.progress.advice, without))
+            self.change(advice=(*self.progress.advice, plain(event.why)))
         elif isinstance(event, Planned):
             self._estimate = Estimate(event.seconds)
             self.change(left=sum(event.seconds.values()))

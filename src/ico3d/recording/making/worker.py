@@ -14,10 +14,11 @@ from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.common.files import write_atomic
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
-from ico3d.errors import CaptureError, Ico3dError
+from ico3d.errors import CaptureError, Ico3dError, printable
+from ico3d.failures import FAILURES
 from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import UPLOAD
-from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.making.beside import FULL_DISK, end_with_parent
 from ico3d.recording.making.joining import join
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun
@@ -39,7 +40,8 @@ def make(
         The avatar.
 
     Raises:
-        Ico3dError: As for `create`, and if there is no recording.
+        Exception: Whatever `create` raises, and `CaptureError` if there is no recording; the
+            progress says so, too.
     """
     places, about = Places(person.folder), person.consent()
     tell = Reporter(places.folder, begun(places.folder, quality))
@@ -60,11 +62,21 @@ def make(
         )
         create(settings, tell)
         write_atomic(places.avatar, lambda file: _copy(places.made, file))
-    except Ico3dError as error:
-        tell.change(state="failed", error=_short(str(error), person.folder))
+    except Exception as error:
+        tell.change(state="failed", **_failure(error, person.folder))
         raise
     tell.change(state="made")
     return places.avatar
+
+
+def _failure(error: Exception, folder: Path) -> dict[str, Any]:
+    """What the progress says of an error; one that nobody foresaw has no code."""
+    if isinstance(error, MemoryError):
+        return {"error": FAILURES["memory"], "code": "memory"}
+    if not isinstance(error, Ico3dError):
+        return {"error": printable(f"{type(error).__name__}: {error}")}
+    told = {"code": error.code, "values": dict(error.values)}
+    return {"error": _short(str(error), folder)} | told
 
 
 def _short(sentence: str, folder: Path) -> str:
@@ -76,7 +88,7 @@ def _video(person: Person, places: Places) -> Path:
     """The video that was brought, or the parts as one; what was made of another one is cleared."""
     files = sources(person)
     if not files:
-        raise CaptureError("there is no recording: record some parts, or choose a video.")
+        raise CaptureError.of("nothing")
     now = signature(files)
     video = files[0] if files[0].stem == UPLOAD else places.joined
     if _before(places) != now or not video.is_file():
@@ -108,7 +120,7 @@ def main() -> int:
         make(Person(Path(folder)), cast(QualityName, quality), body, look)
     except Ico3dError as error:
         print(f"ico3d: {error}", file=sys.stderr)
-        return 1
+        return FULL_DISK if error.code == "disk-full" else 1
     return 0
 
 
