@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from ico3d.errors import MOST_LETTERS, BundleError, Ico3dError
+from ico3d.errors import MOST_LETTERS, BundleError, CaptureError, Ico3dError
 
 
 @pytest.mark.parametrize(
@@ -18,6 +18,15 @@ from ico3d.errors import MOST_LETTERS, BundleError, Ico3dError
 def test_what_no_terminal_may_obey_is_escaped(text, shown):
     assert str(Ico3dError(text)) == shown
     assert str(pickle.loads(pickle.dumps(BundleError(text)))) == shown
+
+
+def test_a_text_with_a_name_stands_amid_what_a_terminal_adds_and_travels():
+    error = CaptureError.of("faceless", "a.mp4: ", " Go on.", {"n": 6})
+    said = "no face is found in any of the 6 pictures: film one person who looks towards the camera"
+    assert str(error) == f"a.mp4: {said}. Go on."
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.code, again.values, str(again)) == ("faceless", {"n": 6}, str(error))
+    assert (Ico3dError("a.").code, Ico3dError("a.").values) == ("", {})
 
 
 def test_long_quotations_leave_their_middle_out():

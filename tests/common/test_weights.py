@@ -100,7 +100,9 @@ def test_a_repository_is_found_in_the_hubs_cache(tmp_path, monkeypatch):
 def test_a_missing_file_says_how_to_get_it():
     with pytest.raises(MissingModelError, match=r"ico3d weights fetch ave \(CC BY-NC 4\.0\)"):
         model_file("audio_visual_encoder.pth", "something")
-    with pytest.raises(MissingModelError, match=r"needs the model file 'x\.bin': put it into"):
+    with pytest.raises(
+        MissingModelError, match=r"the model file 'x\.bin' is not installed\. Put it into"
+    ):
         model_file("x.bin", "something")
     with pytest.raises(SettingsError, match=r"no weights 'x': choose from face-landmarker, pose-"):
         cached("x")

@@ -71,8 +71,9 @@ def test_moments_follow_and_those_of_clones_begin_at_zero():
 def test_a_head_that_faded_is_one_sentence():
     model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS.density, 0)
     density._stats = DensityStats.zeros(3)
-    with pytest.raises(ModelError, match="all Gaussians have faded by step 1"):
+    with pytest.raises(ModelError, match="faded away by step 1 of learning") as told:
         density.adapt(model, Optimiser(), _sampled([0, 0, 0], [9, 9, 9]), 1)
+    assert (told.value.code, told.value.values) == ("faded", {"step": 1})
 
 
 def test_what_no_picture_shows_dies():

@@ -83,7 +83,7 @@ def test_where_all_are_damaged_one_sentence_says_so_and_nothing_is_removed(died)
         ModelError, match=r"There is no other checkpoint .* to begin afresh"
     ) as told:
         run_loop(Walk(), RunFolder(died, {}), SETTINGS)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(told.value) and told.value.code == "checkpoint"
     assert {file.name: file.read_bytes() for file in died.glob("*.*")} == before
 
 

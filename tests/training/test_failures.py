@@ -41,9 +41,10 @@ def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
         files_of_at_most(500_000),
         pytest.raises(
             StorageError, match=r"checkpoint\.safetensors cannot be written, as the disk is full"
-        ),
+        ) as told,
     ):
         run_loop(Broad(), run, SETTINGS)
+    assert told.value.code == "disk-full"
     assert (run.path / "checkpoint.safetensors").read_bytes() == kept
     assert not [path for path in run.path.iterdir() if path.name.startswith(".")]
     second = Broad()
@@ -52,14 +53,26 @@ def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("error", "said"),
+    ("error", "said", "code"),
     [
-        (torch.AcceleratorError("CUDA error: unspecified launch failure\nmore"), "failure"),
-        (RuntimeError("CUDA error: device-side assert triggered"), "the GPU failed at step 6"),
-        (torch.OutOfMemoryError("CUDA out of memory."), "memory ran out at step 6"),
+        (
+            torch.AcceleratorError("CUDA error: unspecified launch failure\nmore"),
+            "failure",
+            "gpu-failed",
+        ),
+        (
+            RuntimeError("CUDA error: device-side assert triggered"),
+            "the GPU failed at step 6",
+            "gpu-failed",
+        ),
+        (
+            torch.OutOfMemoryError("CUDA out of memory."),
+            "memory ran out at step 6",
+            "gpu-memory",
+        ),
     ],
 )
-def test_a_gpu_that_vanishes_is_one_sentence(tmp_path, error, said):
+def test_a_gpu_that_vanishes_is_one_sentence(tmp_path, error, said, code):
     class Vanishes(Walk):
         def step(self, index: int) -> dict[str, float]:
             if index == 6:
@@ -74,6 +87,7 @@ def test_a_gpu_that_vanishes_is_one_sentence(tmp_path, error, said):
     run_loop(whole, RunFolder(tmp_path / "whole", {}), SETTINGS)
     run_loop(again, run, SETTINGS)
     assert torch.equal(again.weight, whole.weight)
+    assert (told.value.code, told.value.values) == (code, {"step": 6})
 
 
 def test_other_errors_of_a_step_are_as_they_are(tmp_path):

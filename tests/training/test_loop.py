@@ -35,8 +35,9 @@ def test_a_nan_gradient_is_named_before_it_is_taken_over(tmp_path):
     walk = Walk(break_at=6)
     with pytest.raises(
         ModelError, match=r"the gradient of 'weight' is not finite at step 6: .* from step 4\)"
-    ):
+    ) as told:
         run_loop(walk, RunFolder(tmp_path, {}), SETTINGS)
+    assert told.value.code == "diverged"
     assert all(torch.isfinite(tensor).all() for tensor in walk.tensors().values())
     whole, mended = Walk(), Walk()
     run_loop(whole, RunFolder(tmp_path / "whole", {}), SETTINGS)

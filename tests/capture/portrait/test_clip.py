@@ -9,7 +9,10 @@ import pytest
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait import photometric_poses
+from ico3d.capture.portrait.settings import PortraitSettings
+from ico3d.capture.portrait.track import track_portrait
 from ico3d.cli import main
+from ico3d.errors import CaptureError
 from support.needs import needs
 from support.shared import MODELS, SHARED
 
@@ -68,8 +71,14 @@ def _capture(video: Path, out: Path, *options: str) -> int:
 def test_video_without_a_face(tmp_path, capfd):
     assert _capture(_faceless(tmp_path / "noise.mp4"), tmp_path / "out") == 1
     message = capfd.readouterr().err
-    assert "noise.mp4: no face in any of its 6 frames" in message and "Traceback" not in message
+    assert (
+        "noise.mp4: no face is found in any of the 6 pictures" in message
+        and "Traceback" not in message
+    )
     assert sorted(p.name for p in tmp_path.iterdir()) == ["noise.mp4"]
+    with pytest.raises(CaptureError) as told:
+        track_portrait(tmp_path / "noise.mp4", tmp_path / "out", PortraitSettings())
+    assert (told.value.code, told.value.values) == ("faceless", {"n": 6})
 
 
 def test_existing_folder_is_left_alone(tmp_path, capfd):

@@ -96,7 +96,7 @@ def test_file_that_cannot_be_decoded(tmp_path):
     path = write_video(tmp_path / "v.mp4", [100] * 30)
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 3])  # an MP4's index is at its end
-    with pytest.raises(CaptureError, match=r"v\.mp4 cannot be decoded"):
+    with pytest.raises(CaptureError, match=r"v\.mp4: the file cannot be decoded"):
         open_video(path, 512)
 
 

@@ -59,7 +59,7 @@ def test_a_photograph_is_refused_and_told_why(tmp_path):
 
 def test_what_is_no_video_is_one_sentence(tmp_path):
     (tmp_path / "me.mp4").write_text("not at all")
-    with pytest.raises(CaptureError, match=r"me\.mp4 cannot be decoded as a video"):
+    with pytest.raises(CaptureError, match=r"me\.mp4: the file cannot be decoded as a video"):
         examine(tmp_path / "me.mp4", 512, lambda _: None)
     with pytest.raises(CaptureError, match="there is no video file"):
         examine(tmp_path / "nothing.mp4", 512, lambda _: None)

@@ -1,5 +1,6 @@
 """Cloning: only with a consent of its own, once, and never in the way of the avatar."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from ico3d.bundle.format import Bundle  # noqa: E402
 from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice  # noqa: E402
 from ico3d.cli import main  # noqa: E402
 from ico3d.creating.events import Voiced  # noqa: E402
+from ico3d.creating.looking.advice import Advice  # noqa: E402
 from ico3d.creating.settings import CreateSettings  # noqa: E402
 from ico3d.creating.voice import clone as room  # noqa: E402
 from ico3d.creating.voice.clone import awaits_voice, clone  # noqa: E402
@@ -78,7 +80,7 @@ def test_a_voice_is_cloned_once(settings, fake):
     assert found is not None and kept == KEPT
     assert found.about == ClonedVoice(OPENVOICE, "ada.mp4", AGREED)
     assert found.tone.shape == (256,) and np.ptp(found.tone) == 0  # as the pretended one says
-    assert isinstance(told, Voiced) and told.why == "" and told.seconds > 10
+    assert isinstance(told, Voiced) and told.why is None and told.seconds > 10
     [converter] = fake.ToneColorConverter.made
     again, same, _ = cloned(settings)
     assert again is not None and (again.tone == found.tone).all() and same == [told]
@@ -105,7 +107,8 @@ def test_without_openvoice_the_avatar_is_made_without_it(settings, monkeypatch, 
         "ico3d.chat.services.voice.openvoice.cloning_hindrance", lambda: "openvoice is missing."
     )
     later = " The same command clones the voice once that is mended."
-    assert cloned(settings) == (None, [Voiced(0.0, f"openvoice is missing.{later}")], [])
+    why = Advice("voice-lacking", detail=f"openvoice is missing.{later}")
+    assert cloned(settings) == (None, [Voiced(0.0, why)], [])
 
 
 def test_it_is_cloned_as_soon_as_openvoice_is_there(settings, monkeypatch, request):
@@ -115,13 +118,13 @@ def test_it_is_cloned_as_soon_as_openvoice_is_there(settings, monkeypatch, reque
         monkeypatch.setattr(room, "hindrance", lambda: "")
         assert awaits_voice(settings, place)
         assert not awaits_voice(replace(settings, voice_consent=""), place)
-        place.note_voice(settings, 0.0, "the recording is silent.")
+        place.note_voice(settings, 0.0, Advice("voice-silent"))
         assert not awaits_voice(settings, place)  # nothing has changed about that
 
 
 def test_a_recording_that_tells_no_voice_is_told_and_noted(settings, fake, monkeypatch):
     monkeypatch.setattr(room, "read_sound", lambda path, rate: None)
-    expected = (None, [Voiced(0.0, "the recording has no sound.")], ["cloned_voice.json"])
+    expected = (None, [Voiced(0.0, Advice("voice-none"))], ["cloned_voice.json"])
     assert cloned(settings) == expected == cloned(settings)
     assert not fake.ToneColorConverter.made
 
@@ -134,7 +137,9 @@ def test_what_is_no_tone_colour_is_not_kept(settings, fake, monkeypatch):
     )
     found, [told], kept = cloned(settings)
     assert found is None and not kept
-    assert told.why.startswith("voice.safetensors: 'tone_colour' holds a value that is not finite.")
+    assert told.why.code == "voice-failed"
+    fault = "voice.safetensors: 'tone_colour' holds a value that is not finite."
+    assert told.why.detail.startswith(fault)
 
 
 def test_what_openvoice_lacks_is_told(settings, fake, monkeypatch):
@@ -143,7 +148,16 @@ def test_what_openvoice_lacks_is_told(settings, fake, monkeypatch):
 
     monkeypatch.setattr(fake.ToneColorConverter, "load_ckpt", lacking)
     found, [told], _ = cloned(settings)
-    assert found is None and "lacks a part that would have to be downloaded" in told.why
+    assert found is None and told.why.code == "voice-failed"
+    assert "lacks a part that would have to be downloaded" in told.why.detail
+
+
+def test_a_reason_that_an_earlier_version_noted_is_looked_for_anew(settings, fake):
+    with workplace(settings) as place:
+        place.note_voice(settings, 0.0, Advice("voice-silent"))
+        note = place.voice_file("cloned_voice.json")
+        note.write_text(json.dumps(json.loads(note.read_text()) | {"fault": "it is silent."}))
+        assert place.voice(settings) is None
 
 
 def test_forgetting_a_person_forgets_the_voice(settings, fake, monkeypatch, tmp_path, capsys):
@@ -171,8 +185,11 @@ def test_the_terminal_says_whether_there_is_a_voice(settings, capsys):
 
     tell = Terminal(settings)
     tell(Voiced(31.4))
-    tell(Voiced(0.0, "the recording is silent."))
+    tell(Voiced(0.0, Advice("voice-silent")))
+    tell(Voiced(0.0, Advice("voice-lacking", detail="openvoice is not installed.")))
     assert capsys.readouterr().out.splitlines() == [
         "The avatar's voice is cloned from 31 s of clean speech.",
         "The avatar is made without a voice of its own: the recording is silent.",
+        "The avatar is made without a voice of its own: OpenVoice, which imitates voices, is not "
+        "installed here, or not all of it. openvoice is not installed.",
     ]

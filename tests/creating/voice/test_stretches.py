@@ -87,23 +87,29 @@ def test_short_breaks_do_not_end_a_stretch():
 
 
 @pytest.mark.parametrize(
-    ("samples", "fault"),
+    ("samples", "code", "most"),
     [
-        (lambda: 0 * said(3), "the recording is silent."),
-        (lambda: np.zeros(0), "the recording has no sound."),
-        (lambda: said(1)[: 4 * RATE], "s of speech are heard, and 10 s are needed: talk more."),
-        (lambda: music(30 * RATE), "0 s of speech are heard, and 10 s are needed: talk more."),
-        (lambda: said(3) + noise(len(said(3)), 0.1), "0 s of speech are free of noise and"),
-        (lambda: said(3) + music(len(said(3))), "0 s of speech are free of noise and clipping"),
-        (lambda: np.clip(40 * said(3), -1, 1), "0 s of speech are free of noise and clipping"),
+        (lambda: 0 * said(3), "voice-silent", None),
+        (lambda: np.zeros(0), "voice-none", None),
+        (lambda: said(1)[: 4 * RATE], "voice-short", 4),
+        (lambda: music(30 * RATE), "voice-short", 0),
+        (lambda: said(3) + noise(len(said(3)), 0.1), "voice-noisy", 0),
+        (lambda: said(3) + music(len(said(3))), "voice-noisy", 0),
+        (lambda: np.clip(40 * said(3), -1, 1), "voice-noisy", 0),
     ],
 )
-def test_what_tells_no_voice_is_refused_in_a_sentence(samples, fault):
+def test_what_tells_no_voice_is_refused_with_a_reason(samples, code, most):
     speech = taken(samples())
-    assert fault in speech.fault and speech.fault.endswith(".") and not len(speech.samples)
+    assert speech.fault is not None and speech.fault.code == code and not len(speech.samples)
+    if most is None:
+        assert speech.fault.values == {}
+    else:
+        assert speech.fault.values["least"] == 10 and 0 <= speech.fault.values["n"] <= most
 
 
 def test_a_video_without_sound():
     from ico3d.creating.voice.stretches import clean_speech
 
-    assert clean_speech(None).fault == "the recording has no sound."
+    assert str(clean_speech(None).fault) == (
+        "the avatar is made without a voice of its own: the recording has no sound."
+    )

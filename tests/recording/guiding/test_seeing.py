@@ -106,6 +106,7 @@ def test_a_turn_that_is_too_small_is_told(eye, tmp_path):
         "level": "better",
         "values": {"n": 0, "goal": 20},
         "spans": [],
+        "detail": "",
     }
     assert short_of("left", [0.0, 25.0, 0.0, 0.0]) == short_of("text-1", [0.0] * 4) == []
     (short,) = short_of("down", [0.0, 0.0, -4.5, 9.0])

@@ -1,6 +1,7 @@
 """The processes that make avatars: one at a time, stopped, gone on with after a restart."""
 
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ico3d.avatar.embodying.look import Look
+from ico3d.failures import FAILURES
 from ico3d.recording.keeping.body_choice import BodyChoice, write_choice
 from ico3d.recording.keeping.people import People
 from ico3d.recording.making import makers as room
@@ -72,7 +74,20 @@ def test_what_falls_over_is_said(people, makers):
     makers.begin(ada, "quick")
     _until(lambda: makers.progress(ada).state != "running")
     assert "begin again, it goes on where it was" in makers.progress(ada).error
+    assert makers.progress(ada).code == "ended"
     assert (Places(ada.folder).folder / "log.txt").exists()
+
+
+def test_what_the_system_kills_is_said_and_goes_on(people, makers):
+    ada = people.person("Ada")
+    makers.begin(ada, "good")
+    _until(_began(ada).exists)
+    os.kill(makers._running["Ada"].pid, signal.SIGKILL)  # as where memory runs out
+    _until(lambda: makers.progress(ada).state != "running")
+    found = makers.progress(ada)
+    assert (found.state, found.code, found.error) == ("failed", "killed", FAILURES["killed"])
+    makers.begin(ada, "good")
+    assert makers.progress(ada).code == ""
 
 
 def test_a_server_that_comes_back_goes_on(people, makers):

@@ -18,7 +18,7 @@ from ico3d.recording.making.progress import (
 )
 
 ADVICE = (Advice("blur", spans=((2, 3),)), Advice("face-none", "refused"))
-BLUR = {"code": "blur", "level": "better", "values": {}, "spans": [[2, 3]]}
+BLUR = {"code": "blur", "level": "better", "values": {}, "spans": [[2, 3]], "detail": ""}
 
 
 def test_events_become_steps_time_and_pictures(tmp_path):
@@ -55,11 +55,14 @@ def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
     tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, ADVICE, True)))
     tell(Voiced(30.0))
     assert len(tell.progress.advice) == 1
-    tell(Voiced(0.0, "the recording is silent."))
+    lacking = "openvoice is not installed."
+    tell(Voiced(0.0, Advice("voice-short", values={"n": 4, "least": 10})))
+    tell(Voiced(0.0, Advice("voice-lacking", detail=lacking)))
     found = read_progress(tmp_path)
     assert found is not None
-    (why,) = found.advice[1:]
-    assert (why["code"], why["values"]) == ("voice", {"why": "the recording is silent."})
+    short, missing = found.advice[1:]
+    assert (short["code"], short["values"]) == ("voice-short", {"n": 4, "least": 10})
+    assert (missing["code"], missing["detail"]) == ("voice-lacking", lacking)
 
 
 def test_what_is_damaged_is_nothing(tmp_path):

@@ -23,7 +23,9 @@ def end_with_parent() -> None:
     """Ends this process, and those that it started, when its standard input closes."""
 
     def wait() -> None:
-        sys.stdin.buffer.read()
+        with contextlib.suppress(OSError):
+            while os.read(0, 4096):  # not by sys.stdin, whose lock would abort an ending process
+                pass
         os.killpg(0, signal.SIGKILL)
 
     threading.Thread(target=wait, daemon=True).start()

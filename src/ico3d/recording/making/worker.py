@@ -3,7 +3,9 @@
 It ends with the process that started it, and whoever starts it again goes on where it was.
 """
 
+import contextlib
 import json
+import os
 import re
 import shutil
 import sys
@@ -119,7 +121,8 @@ def main() -> int:
     try:
         make(Person(Path(folder)), cast(QualityName, quality), body, look)
     except Ico3dError as error:
-        print(f"ico3d: {error}", file=sys.stderr)
+        with contextlib.suppress(OSError):  # the log lies on the same disk
+            os.write(sys.stderr.fileno(), f"ico3d: {error}\n".encode())
         return FULL_DISK if error.code == "disk-full" else 1
     return 0
 
