@@ -121,6 +121,57 @@ test('with other recordings nothing goes on, and that is said', async () => {
   expect(await page.textContent('#choices')).toMatch(/^The recordings have changed since, so it starts over/);
 }, 60_000);
 
+test('what ends a making, and why there is no voice, is said in the language of the page', async () => {
+  const silent = { code: 'voice-short', level: 'better', values: { n: 4, least: 10 }, spans: [], detail: '' };
+  const lacking = { code: 'voice-lacking', level: 'better', values: {}, spans: [], detail: 'openvoice is not installed.' };
+  const failed = { error: 'in English', code: 'disk-room', values: { free: 0.1, needed: 0.5 } };
+  progress('failed', { ...failed, advice: [silent, lacking] });
+  await open();
+  await page.selectOption('#language', 'de');
+  const shown = () => page.textContent('#error');
+  expect(await shown()).toBe('Auf der Festplatte sind noch 0,1 GB frei, und 0,5 GB braucht es: Schaffen Sie Platz.');
+  expect(await visible('again', 'detail')).toEqual([true, false]);
+  const reasons = await page.$$eval('#betters li > span', (spans) => spans.map((span) => span.textContent));
+  expect(reasons).toEqual([
+    'Der Avatar entsteht ohne eigene Stimme: 4 s Sprache sind zu hören, und 10 s braucht es: Sprechen Sie mehr.',
+    'Der Avatar entsteht ohne eigene Stimme: OpenVoice, das Stimmen nachahmt, ist hier nicht oder nicht ganz installiert.',
+  ]);
+  expect(await page.isVisible('#betters details p')).toBe(false);
+  await page.click('#betters summary');
+  expect(await page.textContent('#betters details p:visible')).toBe('openvoice is not installed.');
+  await page.selectOption('#language', 'fr');
+  expect(await shown()).toBe('Il reste 0,1 Go sur le disque et il en faut 0,5 Go : libérez de la place.');
+  await judge(page, 'studio failed');
+
+  progress('failed', { error: 'ZeroDivisionError: division by zero' });
+  await page.reload();
+  await page.waitForSelector('#detail:visible');
+  expect(await shown()).toBe(
+    'Un imprévu a arrêté la création ; ce que vous avez enregistré est conservé. Appuyez sur « Continuer à partir de là » pour reprendre.',
+  );
+  expect(await page.isVisible('#technical')).toBe(false);
+  await page.click('#detail summary');
+  expect(await page.textContent('#technical:visible')).toBe('ZeroDivisionError: division by zero');
+  expect(await page.getAttribute('#technical', 'lang')).toBe('en');
+  await judge(page, 'studio unforeseen');
+}, 120_000);
+
+test('a making that the system kills is said in the language of the page, and goes on', async () => {
+  progress('stopped');
+  await open();
+  await page.selectOption('#language', 'es');
+  await page.click('#again');
+  await page.waitForSelector('#halt:visible');
+  runPython('studio/killed.py', person);
+  await page.waitForSelector('#again:visible', PATIENCE);
+  expect(await page.textContent('#error')).toMatch(/^La creación fue interrumpida a la fuerza, como ocurre cuando falta memoria/);
+  await page.click('#again');
+  await page.waitForSelector('#halt:visible');
+  expect(await page.textContent('#error')).toBe('');
+  await page.click('#halt');
+  await page.waitForSelector('#again:visible');
+}, 120_000);
+
 test.skipIf(!hasTracker)('recordings without a face are refused in the language of the page, and stay', async () => {
   await open();
   await page.selectOption('#language', 'de');
