@@ -24,6 +24,7 @@ from ico3d.recording.making import makers, worker  # noqa: E402
 from ico3d.recording.making.places import Places  # noqa: E402
 from ico3d.recording.making.progress import read_progress  # noqa: E402
 from support.full_disk import files_of_at_most  # noqa: E402
+from support.shared import MODELS  # noqa: E402
 from support.studio_page.parts import begun, kept, part_file  # noqa: E402
 
 WORDS = Path(__file__).parents[3] / "viewer" / "src" / "words" / "studio.json"
@@ -188,6 +189,16 @@ def test_what_nobody_foresaw_has_no_code_and_its_own_words(person, video, monkey
     found = _brought(person, video.read_bytes())
     assert (found.code, found.values) == ("", {})
     assert found.error == "ZeroDivisionError: integer division or modulo by zero"
+
+
+@needs("mediapipe")
+@pytest.mark.skipif(not (MODELS / "face_landmarker.task").is_file(), reason="no face model is here")
+@pytest.mark.parametrize(("level", "code"), [(120, "face-none"), (3, "face-dark")])
+def test_a_video_without_a_face_and_without_light(person, tmp_path, monkeypatch, level, code):
+    """What looking at a video refuses is told as advice, and needs no code of its own."""
+    monkeypatch.setenv("ICO3D_MODELS", str(MODELS))
+    found = _brought(person, part_file(tmp_path / "seen.mp4", 100, level).read_bytes())
+    assert [one["code"] for one in found.refused] == [code] and found.code == ""
 
 
 @pytest.mark.parametrize("code", FAILURES)
