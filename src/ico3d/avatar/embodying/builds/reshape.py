@@ -19,6 +19,8 @@ STRETCH = 1.3
 Surfaces stay within it; inside of an arm, where front and back move apart, what lies there would
 be drawn out until it shows outside.
 """
+FELT = 1e-5
+"""Least change of direction or length that is more than half a unit of the numbers kept."""
 SMALLEST = 1e-30
 """Least size of a Gaussian in metres, which has a logarithm."""
 NORMAL_UNIT = 127
@@ -45,7 +47,7 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
     means = body.means.astype(np.float64)
     moves, slopes = change.at(means)  # (N, 3), (N, 3, 3)
     slopes = _bounded(slopes)
-    touched = np.abs(slopes - np.eye(3)).max((1, 2)) > 0
+    touched = np.abs(slopes - np.eye(3)).max((1, 2)) > FELT
     parts = _stretched(body, slopes) if touched.any() else {}
     kept = {
         name: np.where(_like(touched, new), new, getattr(body, name)) for name, new in parts.items()
