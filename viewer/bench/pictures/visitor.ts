@@ -58,6 +58,8 @@ export async function ask(page: Page, question = QUESTION): Promise<void> {
 
 /** The line between a page and its server, which can be kept from going on. */
 export class Line {
+  /** Is told every text message of the server. */
+  onText: (text: string) => void = () => {};
   private readonly sockets: WebSocketRoute[] = [];
   private down = false;
   private held = false;
@@ -79,6 +81,7 @@ export class Line {
     const server = socket.connectToServer();
     let holds = false;
     server.onMessage((message) => {
+      if (typeof message === 'string') this.onText(message);
       if (!holds) socket.send(message);
       if (this.held && typeof message === 'string' && hold?.test(message)) holds = true;
     });
