@@ -123,6 +123,6 @@ def test_a_long_clip_takes_no_more_memory_than_a_short_one(tmp_path):
     tracemalloc.start()
     try:
         even_out(tmp_path, readings)
-        assert tracemalloc.get_traced_memory()[1] < 48e6  # 720 pictures at once took 190 MB
+        assert tracemalloc.get_traced_memory()[1] < 48e6  # 720 pictures at once took 171 MB
     finally:
         tracemalloc.stop()
