@@ -23,3 +23,5 @@ MAX_KNOWN_POSES = 256
 """Stored poses with which a page compares every pose."""
 MAX_CASTERS = 20_000
 """Spheres that a page draws into a shadow map at every pose."""
+MAX_CAMERA_LENGTH = 1e4
+"""Metres; anything farther overflows when a camera is made of it."""

@@ -1,6 +1,7 @@
 """The manifest of a bundle (docs/bundle.md) as typed data."""
 
 import json
+import math
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -351,6 +352,14 @@ def _check_camera(camera: CameraInfo) -> None:
     _require(1 <= camera.fov_y <= 170, "camera.fov_y", "lie between 1 and 170 degrees")
     _require(camera.eye != camera.target, "camera.eye", "differ from the target")
     _require(any(camera.up), "camera.up", "have a length")
+    for name in ("eye", "target", "up"):
+        near = all(abs(x) <= limits.MAX_CAMERA_LENGTH for x in getattr(camera, name))
+        _require(near, f"camera.{name}", f"be within {limits.MAX_CAMERA_LENGTH:g} m")
+    ahead = [b - a for a, b in zip(camera.eye, camera.target, strict=True)]
+    long, up = math.hypot(*ahead), math.hypot(*camera.up)
+    _require(min(long, up) > 1e-6, "camera", "have an eye away from its target, and a long up")
+    along = sum(a * b for a, b in zip(ahead, camera.up, strict=True)) / (long * up)
+    _require(abs(along) < 1 - 1e-9, "camera.up", "point another way than the camera looks")
 
 
 def _check_voice(voice: ClonedVoice) -> None:

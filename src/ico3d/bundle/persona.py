@@ -1,13 +1,12 @@
 """Who an avatar is: name, knowledge and manner, from a bundle or a file (docs/conversation.md)."""
 
 import re
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from ico3d.bundle.limits import MAX_MANIFEST_BYTES, MAX_NOTES
-from ico3d.common.typed import Rules, fill, parse_json, plain
+from ico3d.common.typed import Rules, fill, parse_json, parse_toml, plain
 from ico3d.errors import BundleError
 
 LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
@@ -130,8 +129,8 @@ def _check_note(note: str, number: int, path: Path) -> None:
 
 def _parse_toml(data: bytes, path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(data.decode())
-    except (ValueError, RecursionError) as error:
+        return parse_toml(data.decode())
+    except ValueError as error:
         raise BundleError(f"{path}: is not valid TOML ({error}).") from error
 
 

@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import tomllib
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence, Sized
@@ -10,6 +12,8 @@ from functools import cache
 from typing import Annotated, Any, Literal, TypeVar, cast
 
 T = TypeVar("T")
+MOST_PARTS = 100
+"""Parts of a dotted key of TOML: Python's parser takes minutes for one of tens of thousands."""
 NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
 
 
@@ -302,6 +306,28 @@ def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any
     except (ValueError, RecursionError) as cause:
         line = (str(cause).splitlines() or [type(cause).__name__])[0][:120]
         raise error(f"{name}: is not valid JSON ({line}).") from cause
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Parses TOML that may be anybody's.
+
+    Raises:
+        ValueError: If the text is no TOML, or nested too deep.
+    """
+    if any(map(_has_many_parts, re.split(r"[=\n]", text))):
+        raise ValueError(f"a key has more than {MOST_PARTS} parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("it is nested too deep") from error
+
+
+def _has_many_parts(text: str) -> bool:
+    """Whether a text may be a key of too many parts; sentences between full stops have spaces."""
+    if text.count(".") < MOST_PARTS:
+        return False
+    parts = [part.strip() for part in text.split(".")]
+    return sum(len(p.split()) == 1 or p[:1] in ("'", '"') for p in parts) > MOST_PARTS
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

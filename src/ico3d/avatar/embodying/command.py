@@ -41,9 +41,11 @@ class Embody:
 
         from ico3d.avatar.embodying.embody import embody
         from ico3d.bundle.format import Bundle
+        from ico3d.errors import printable
 
         console = Console()
         look = Look(self.build, self.outfit)
         embody(Bundle.open(self.head), Bundle.open(self.body), self.out, console.print, look)
         Bundle.open(self.out)
-        console.print(f"{self.out}: {self.out.stat().st_size / 1e6:.2f} MB.")
+        size = self.out.stat().st_size
+        console.print(printable(f"{self.out}: {size / 1e6:.2f} MB."), markup=False)

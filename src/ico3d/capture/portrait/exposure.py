@@ -6,6 +6,7 @@ whole picture, in linear light. The face must agree, or nothing is done: it may 
 that changes, a window or a screen.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from ico3d.capture.portrait import cutout
 from ico3d.capture.portrait.files import load_uint8, save_picture
 from ico3d.capture.portrait.readings import Readings
+from ico3d.common.spread import spread
 
 LEAST_SPREAD = 0.02
 """Standard deviation of the logarithms of the factors below which pictures stay as they are."""
@@ -21,6 +23,9 @@ PIXELS = 4000
 USABLE = (0.01, 0.8)
 """Linear light of the pixels that are compared: neither black nor nearly clipped."""
 LEAST_PIXELS = 200
+USUAL = 300
+"""Number of pictures, spread over the clip, that tell how the background usually looks, at most:
+all of a long clip would not fit into the memory."""
 
 
 def linear(values: np.ndarray) -> np.ndarray:
@@ -45,32 +50,34 @@ def even_out(work: Path, readings: Readings) -> float:
         How far they wandered, as a share of the light (standard deviation); 0 where nothing was
         done.
     """
-    background, faces = _seen(work, readings)
-    if background is None:
-        return 0.0
-    factors = factors_of(background)  # (F, 3)
-    spread = float(np.log(factors).std(0).max())
-    if spread < LEAST_SPREAD or not agree(factors, faces):
+    factors, faces = _seen(work, readings)
+    wandered = float(np.log(factors).std(0).max())
+    if wandered < LEAST_SPREAD or not agree(factors, faces):
         return 0.0
     for number, factor in zip(readings.frames, factors, strict=True):
         file = work / "ori_imgs" / f"{number}.jpg"
         save_picture(file, evened(load_uint8(file), factor))
-    return spread
+    return wandered
 
 
-def factors_of(background: np.ndarray) -> np.ndarray:
+def factors_of(background: Iterable[np.ndarray], usual: np.ndarray) -> np.ndarray:
     """(F, 3) factors of linear red, green and blue; the mean of their logarithms is 0.
 
     Args:
-        background: (F, N, 3) linear light of N places of the background in F pictures.
+        background: (N, 3) linear light of N places of the background in each of F pictures.
+        usual: (N, 3) how these places usually look.
     """
-    usual = np.median(background, axis=0)  # (N, 3)
     usable = ((usual > USABLE[0]) & (usual < USABLE[1])).all(1)  # (N,)
-    if usable.sum() < LEAST_PIXELS:
-        return np.ones((len(background), 3))
-    ratios = np.log(np.maximum(background[:, usable], 1e-4) / usual[usable])  # (F, n, 3)
-    found = np.median(ratios, axis=1)  # (F, 3)
+    known = usable.sum() >= LEAST_PIXELS
+    found = np.stack(
+        [_shift(one[usable], usual[usable]) if known else np.zeros(3) for one in background]
+    )
     return np.exp(found - found.mean(0))
+
+
+def _shift(light: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """(3,) median logarithm of how much brighter places (n, 3) are than usually."""
+    return np.median(np.log(np.maximum(light, 1e-4) / usual), axis=0)
 
 
 def agree(factors: np.ndarray, faces: np.ndarray) -> bool:
@@ -86,21 +93,46 @@ def evened(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
     return np.stack([table[image[..., c], c] for c in range(3)], -1)
 
 
-def _seen(work: Path, readings: Readings) -> tuple[np.ndarray | None, np.ndarray]:
-    """Linear light of background (F, N, 3), None where there is too little, and of faces (F, 3)."""
-    import cv2
+def _seen(work: Path, readings: Readings) -> tuple[np.ndarray, np.ndarray]:
+    """Factors (F, 3), 1 where too little is seen of the background, and faces' light (F, 3).
 
+    One picture is in memory at a time, and of `USUAL` the places that are compared.
+    """
     first = load_uint8(work / "ori_imgs" / f"{readings.frames[0]}.jpg")
     shape = cutout.working(first).shape[:2]
     scale = shape[1] / first.shape[1]
-    labels = [cutout.seeds(shape, marks * scale) for marks in readings.landmarks]
-    behind = np.all([one == cv2.GC_BGD for one in labels], axis=0)  # (h, w)
-    places = np.flatnonzero(behind)[:: max(1, behind.sum() // PIXELS)]
-    background = np.empty((len(labels), len(places), 3), np.float32)
-    faces = np.empty((len(labels), 3))
-    for index, (number, marks) in enumerate(zip(readings.frames, readings.landmarks, strict=True)):
-        small = cutout.working(load_uint8(work / "ori_imgs" / f"{number}.jpg"))
-        light = linear(small / 255.0)
-        background[index] = light.reshape(-1, 3)[places]
-        faces[index] = light[cutout.inside_face(shape, marks * scale)].mean(0)
-    return (background if len(places) >= LEAST_PIXELS else None), faces
+    places = _places(shape, [marks * scale for marks in readings.landmarks])
+    chosen = [readings.frames[index] for index in spread(len(readings.frames), USUAL)]
+    usual = np.median([_light(work, number)[places] for number in chosen], axis=0)  # (N, 3)
+    faces: list[np.ndarray] = []
+
+    def background() -> Iterable[np.ndarray]:
+        for number, marks in zip(readings.frames, readings.landmarks, strict=True):
+            light = _light(work, number)
+            inside = cutout.inside_face(shape, marks * scale).reshape(-1)
+            faces.append(light[inside].mean(0))
+            yield light[places]
+
+    return factors_of(background(), usual), np.array(faces)
+
+
+def _places(shape: tuple[int, ...], landmarks: list[np.ndarray]) -> np.ndarray:
+    """At most `PIXELS` indices of pixels that are background in every picture.
+
+    Args:
+        shape: (h, w) of the pictures.
+        landmarks: (478, 2) of the face in pixels of each of them.
+    """
+    import cv2
+
+    behind = np.ones(shape, bool)
+    for marks in landmarks:
+        behind &= cutout.seeds(shape, marks) == cv2.GC_BGD
+    found = np.flatnonzero(behind)
+    return found[:: max(1, -(-len(found) // PIXELS))]
+
+
+def _light(work: Path, number: int) -> np.ndarray:
+    """(h · w, 3) float32 linear light of a picture in working size."""
+    small = cutout.working(load_uint8(work / "ori_imgs" / f"{number}.jpg"))
+    return linear(small / 255.0).astype(np.float32).reshape(-1, 3)

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +13,11 @@ from ico3d.chat.settings.keys import check_key
 from ico3d.chat.settings.mcp import McpServer, check_servers
 from ico3d.chat.settings.tools import Tool, check_tools
 from ico3d.chat.settings.visits import Visits
-from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
+from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of, parse_toml
 from ico3d.errors import SettingsError
 
+MOST_BYTES = 1 << 20
+"""Size of a settings file; a link to a device has no end."""
 BEST = "best"
 """Name that stands for the best service that works on this machine without further settings."""
 T = TypeVar("T")
@@ -323,8 +324,12 @@ def described(kind: Any) -> str:
 
 def _parse(path: Path) -> dict[str, Any]:
     try:
-        text = path.read_text(encoding="utf-8")
-        values = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise SettingsError(f"{path}: is larger than {MOST_BYTES} bytes.")
+        text = data.decode("utf-8").replace("\r\n", "\n")
+        values = json.loads(text) if path.suffix == ".json" else parse_toml(text)
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read ({error.strerror}).") from error
     except (ValueError, RecursionError) as error:

@@ -5,14 +5,13 @@ They are stored in a text file (TOML) that can be edited by hand.
 
 import json
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
-from ico3d.common.typed import Rules, fill
+from ico3d.common.typed import Rules, fill, parse_toml
 from ico3d.errors import SettingsError
 
 CUTS = "clips.toml"
@@ -124,7 +123,7 @@ def from_toml(content: bytes, where: str, fps: float, num_frames: int) -> tuple[
         SettingsError: If the file is damaged, makes no sense or belongs to another recording.
     """
     try:
-        values: dict[str, Any] = tomllib.loads(content.decode())
+        values: dict[str, Any] = parse_toml(content.decode())
     except ValueError as error:
         raise SettingsError(f"{where} is not valid TOML ({error}).") from error
     cuts = fill(Cuts, {"clip": [], **values}, where, Rules(SettingsError))

@@ -1,0 +1,39 @@
+"""TOML of strangers: what Python's parser takes minutes for is refused, long texts are not."""
+
+import time
+
+import pytest
+
+from ico3d.bundle.persona import read_persona
+from ico3d.chat.settings.conversation import MOST_BYTES, read_settings
+from ico3d.common.typed import parse_toml
+from ico3d.errors import BundleError, SettingsError
+
+
+@pytest.mark.parametrize("part", ["a", '"a b"', " a ", "'a'"])
+def test_a_key_of_many_parts_is_refused_at_once(tmp_path, part):
+    file, started = tmp_path / "strange.toml", time.monotonic()
+    file.write_text(".".join([part] * 30_000) + " = 1")
+    with pytest.raises(SettingsError, match="a key has more than 100 parts"):
+        read_settings(file)
+    with pytest.raises(BundleError, match="a key has more than 100 parts"):
+        read_persona(file)
+    assert time.monotonic() - started < 5
+
+
+def test_a_note_of_many_sentences_is_none():
+    note = "She likes tea. " * 2000
+    assert parse_toml(f'notes = ["{note}"]') == {"notes": [note]}
+    assert parse_toml("a.b.c = 1") == {"a": {"b": {"c": 1}}}
+
+
+def test_what_is_nested_too_deep_is_no_toml():
+    with pytest.raises(ValueError, match="nested too deep"):
+        parse_toml("a = " + "[" * 50_000)
+
+
+def test_settings_without_an_end_are_not_read(tmp_path):
+    file = tmp_path / "long.toml"
+    file.write_bytes(b"#" * (MOST_BYTES + 1))
+    with pytest.raises(SettingsError, match="is larger than 1048576 bytes"):
+        read_settings(file)
