@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 
 from ico3d.chat.serving import crowd as crowds
-from ico3d.chat.serving.crowd import MOST_SOCKETS, Crowd, Meters, machine_of
+from ico3d.chat.serving.crowd import MOST_SOCKETS, UNKNOWN, Crowd, Meters, machine_of
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.waiting import MOST_WAITING, FullError, WaitingLine
 
@@ -23,7 +23,9 @@ from ico3d.chat.serving.waiting import MOST_WAITING, FullError, WaitingLine
         ("127.0.0.1", ""),
         ("::1", ""),
         ("::ffff:127.0.0.1", ""),
-        ("testclient", ""),
+        ("_hidden", UNKNOWN),  # as proxies may put it
+        ("[2001:db8::1]:80", UNKNOWN),
+        ("", ""),
     ],
 )
 def test_a_machine_is_known_by_its_address_or_its_network(address, machine):

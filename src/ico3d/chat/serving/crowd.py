@@ -10,6 +10,8 @@ from ico3d.chat.supervision.allowance import Bucket
 MOST_SOCKETS = 64
 """Open WebSockets of one machine; a classroom or an office may share its address."""
 REMEMBERED = 4096  # machines whose use is counted
+UNKNOWN = "unknown"
+"""All machines for which a proxy states something that is no address."""
 OWN_NETWORK = 64  # bits of an IPv6 address that tell one household from another
 
 
@@ -78,13 +80,14 @@ def machine_of(client: tuple[str, int] | None) -> str:
         client: Address and port of the connection, as in an ASGI scope.
 
     Returns:
-        An IPv4 address or an IPv6 network. Empty for this machine itself and where the address is
-        unknown: behind a proxy that does not tell them, all visitors would be one.
+        An IPv4 address or an IPv6 network; `UNKNOWN` for all of whom a proxy says something else.
+        Empty for this machine itself and where nothing is said: behind a proxy that does not tell
+        addresses, all visitors would be one.
     """
     try:
         address = ipaddress.ip_address(client[0]) if client else None
     except ValueError:
-        return ""
+        return UNKNOWN if client and client[0] else ""
     if isinstance(address, ipaddress.IPv6Address):
         address = address.ipv4_mapped or address
     if address is None or address.is_loopback:
