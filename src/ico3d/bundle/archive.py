@@ -58,9 +58,9 @@ def write_zip(path: Path, files: Mapping[str, bytes]) -> None:
     sizes = {name: len(data) for name, data in files.items()}
     _check_names(list(sizes), path)
     _check_sizes(sizes, path)
-    if path.is_dir():
-        raise BundleError(f"{path} is a folder: name a file to write.")
     try:
+        if path.exists() and not path.is_file():
+            raise BundleError(f"{path} is a folder or a device: name a file to write.")
         write_atomic(path, lambda temporary: _write_zip(temporary, files))
     except OSError as error:
         raise BundleError(f"{path} cannot be written: {error.strerror}.") from error
