@@ -1,6 +1,8 @@
 """What a bundle is: round trips, and the listing's checks."""
 
 import json
+import os
+import re
 import zipfile
 from dataclasses import replace
 
@@ -136,3 +138,24 @@ def test_a_large_thumbnail_is_refused(tmp_path, size):
 def test_there_must_be_a_bundle(tmp_path):
     with pytest.raises(BundleError, match="there is no bundle"):
         Bundle.open(tmp_path / "nothing.ico3d")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("folder", "folder is a folder or a device: name a file to write."),
+        ("pipe", "pipe is a folder or a device: name a file to write."),
+        ("file/a.ico3d", "a.ico3d cannot be written: "),
+        ("n" * 300, "cannot be written: File name too long."),
+    ],
+)
+def test_where_no_file_can_be_written_is_one_sentence(tmp_path, name, said):
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "file").write_bytes(b"kept")
+    head = random_head(50)
+    with pytest.raises(BundleError, match=re.escape(said)):
+        write_bundle(tmp_path / name, random_manifest(head), random_files(head))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder", "pipe"]
+    assert (tmp_path / "pipe").is_fifo()
+    assert (tmp_path / "file").read_bytes() == b"kept"

@@ -167,8 +167,9 @@ def test_a_body_is_chosen_and_kept_with_the_recording(page, room):
         answer = page.put("/recordings/Ida/body", json=wrong)
         assert (answer.status_code, answer.json()["code"]) == (400, "body")
     assert page.get("/recordings/Ida").json()["body"] == choice
-    (room.people.folder / "Ida" / "body.json").write_text("[]")
-    assert page.get("/recordings/Ida").json()["body"] == alone
+    for damaged in ("[]", "[" * 100_000):
+        (room.people.folder / "Ida" / "body.json").write_text(damaged)
+        assert page.get("/recordings/Ida").json()["body"] == alone
     assert page.put("/recordings/Eve/body", json=choice).json()["code"] == "unknown"
 
 
@@ -237,6 +238,9 @@ def test_the_progress_and_the_face_are_shown(page, room):
     made = page.get("/recordings/Ida").json()["making"]
     assert (made["state"], made["faces"], made["decibels"]) == ("made", 2, 30.0)
     assert page.get("/recordings/Ida/making/face").headers["content-type"] == "image/jpeg"
+    (folder / FACE).rename(folder / "elsewhere.jpg")
+    (folder / FACE).symlink_to(folder / "elsewhere.jpg")
+    assert page.get("/recordings/Ida/making/face").status_code == 404
     assert page.post("/recordings/Ida/talk").json()["code"] == "unmade"
     assert page.post("/recordings/Ida/making", json={"quality": "x"}).json()["code"] == "quality"
 

@@ -49,11 +49,21 @@ def open_archive(path: Path) -> Archive:
 
 
 def write_zip(path: Path, files: Mapping[str, bytes]) -> None:
-    """Writes a zip without compression, atomically; equal files give equal bytes."""
+    """Writes a zip without compression, atomically; equal files give equal bytes.
+
+    Raises:
+        BundleError: If a name or size is not allowed, or no file can be written at the path.
+        StorageError: If the disk is full.
+    """
     sizes = {name: len(data) for name, data in files.items()}
     _check_names(list(sizes), path)
     _check_sizes(sizes, path)
-    write_atomic(path, lambda temporary: _write_zip(temporary, files))
+    try:
+        if path.exists() and not path.is_file():
+            raise BundleError(f"{path} is a folder or a device: name a file to write.")
+        write_atomic(path, lambda temporary: _write_zip(temporary, files))
+    except OSError as error:
+        raise BundleError(f"{path} cannot be written: {error.strerror}.") from error
 
 
 def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:

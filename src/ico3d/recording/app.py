@@ -252,7 +252,7 @@ def _add_making(app: FastAPI, room: Room) -> None:
     @app.get(making + "/face")
     async def face(name: str) -> Response:
         file = Places(room.people.person(name).folder).folder / FACE
-        if not file.is_file():
+        if not file.is_file() or file.is_symlink():
             raise Refused("part", "there is no picture yet.", 404)
         return FileResponse(file, media_type="image/jpeg", headers=NEVER_KEPT)
 

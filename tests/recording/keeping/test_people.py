@@ -105,3 +105,17 @@ def test_a_link_to_elsewhere_is_nobody(tmp_path):
     with pytest.raises(Refused):
         People(tmp_path / "mine").delete("Ida")
     assert (tmp_path / "other" / "Ida" / "consent.json").is_file()
+
+
+@pytest.mark.parametrize("place", ["consent.json", "parts", "making"])
+def test_whose_files_lie_behind_a_link_is_nobody_and_is_not_named(tmp_path, place):
+    ada, ida = begun(tmp_path, "Ada"), begun(tmp_path, "Ida")
+    elsewhere = tmp_path / "elsewhere"
+    if (ida.folder / place).exists():
+        (ida.folder / place).rename(elsewhere)
+    else:
+        elsewhere.mkdir()
+    (ida.folder / place).symlink_to(elsewhere)
+    assert People(tmp_path).names() == [ada.name]
+    with pytest.raises(Refused, match="nothing is recorded of Ida"):
+        People(tmp_path).person("Ida")

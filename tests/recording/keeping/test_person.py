@@ -116,3 +116,36 @@ def test_a_disk_that_fills_up_loses_nothing_that_was_there(person, monkeypatch):
     monkeypatch.undo()
     assert person.unfinished("left", "a1").read_bytes() == WEBM
     assert person.append("left", "a1", 64, b"more") == 68
+
+
+def test_nothing_is_shown_or_written_behind_a_link(person, tmp_path):
+    kept(person, "left", WEBM)
+    secret = tmp_path / "secret"
+    secret.write_bytes(b"secret")
+    parts = person.folder / "parts"
+    (parts / "text-1.webm").symlink_to(secret)
+    (parts / "text-2.a1.part").symlink_to(secret)
+    (parts / "text-3.a1.part").symlink_to(tmp_path / "nowhere")
+    assert [part.id for part in person.parts()] == ["left"]
+    for id in ("text-2", "text-3"):
+        assert _codes(lambda id=id: person.append(id, "a1", 6, b"more")) == ("part", 404)
+    person.remove("text-1")
+    assert not (parts / "text-1.webm").is_symlink()
+    assert secret.read_bytes() == b"secret"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[]", "null", "{}", '{"language": "xx"}', '{"language": []}', "[" * 100_000, "1" * 5000],
+)
+def test_a_damaged_consent_is_one_sentence(person, text):
+    (person.folder / "consent.json").write_text(text)
+    assert _codes(person.consent) == ("unknown", 404)
+
+
+@pytest.mark.parametrize("text", ["[]", "{}", "[" * 100_000, '{"seconds": NaN}'])
+def test_a_damaged_report_says_nothing(person, text):
+    kept(person, "left", WEBM)
+    (person.folder / "parts" / "left.json").write_text(text)
+    (part,) = person.parts()
+    assert part.report == {"seconds": 0.0, "turn": None, "advice": []}

@@ -67,7 +67,9 @@ def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
 
 def test_what_is_damaged_is_nothing(tmp_path):
     assert read_progress(tmp_path) is None
-    for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}'):
+    whole = '{"state": "made", "quality": "good", "%s": %s}'
+    odd = [whole % ("made_of", "3"), whole % ("decibels", "Infinity"), "[" * 100_000]
+    for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}', *odd):
         (tmp_path / "progress.json").write_text(text)
         assert read_progress(tmp_path) is None
 

@@ -11,7 +11,14 @@ from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
 from ico3d.common.files import write_atomic
 from ico3d.creating.settings import OWN_USE
-from ico3d.recording.keeping.person import CONSENT_FILE, TICKED, VOICE_CONSENT, Person
+from ico3d.recording.keeping.person import (
+    CONSENT_FILE,
+    MAKING,
+    PARTS,
+    TICKED,
+    VOICE_CONSENT,
+    Person,
+)
 from ico3d.recording.keeping.plan import scripts
 from ico3d.recording.refusals import Refused, bad_name, full_disk
 
@@ -34,7 +41,7 @@ class People:
     def names(self) -> list[str]:
         """Whose recordings there are, sorted."""
         found = (file.parent.name for file in self.folder.glob(f"*/{CONSENT_FILE}"))
-        return sorted(name for name in found if NAME.fullmatch(name))
+        return sorted(name for name in found if NAME.fullmatch(name) and self._is_here(name))
 
     def person(self, name: str) -> Person:
         """Somebody who agreed.
@@ -42,10 +49,15 @@ class People:
         Raises:
             Refused: If there is nobody of this name.
         """
-        folder = self.folder / checked_name(name)
-        if not (folder / CONSENT_FILE).is_file() or folder.is_symlink():
+        if not self._is_here(checked_name(name)):
             raise Refused("unknown", f"nothing is recorded of {name[:40]}.", 404)
-        return Person(folder)
+        return Person(self.folder / checked_name(name))
+
+    def _is_here(self, name: str) -> bool:
+        """Whether somebody agreed, and their files lie in this folder, not behind a link."""
+        folder = self.folder / name
+        places = folder, folder / CONSENT_FILE, folder / PARTS, folder / MAKING
+        return (folder / CONSENT_FILE).is_file() and not any(map(Path.is_symlink, places))
 
     def begin(
         self, name: str, language: str, agreed: bool, today: date, voice: bool = False

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from ico3d.common.files import write_atomic
+from ico3d.common.typed import parse_json
 from ico3d.recording.keeping.containers import HEAD, suffix_of
-from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD
+from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD, scripts
 from ico3d.recording.refusals import Refused, no_video
 
 CONSENT_FILE = "consent.json"
-PARTS = "parts"
+PARTS, MAKING = "parts", "making"
+"""Folders of what was recorded, and of what is made of it."""
 UNFINISHED = ".part"
 MOST_BYTES, MOST_UPLOADED = 256 << 20, 2 << 30
 """Largest size of a recorded part, and of a video that is brought."""
@@ -20,6 +22,8 @@ TICKED, TICKED_AND_SPOKEN = ", ticked: ", ", ticked and spoken: "
 """How a person agreed, as their consent says it."""
 VOICE_CONSENT = "voice_consent"
 """Entry of the consent of those who agreed that their voice is cloned, too."""
+UNSEEN: dict[str, Any] = {"seconds": 0.0, "turn": None, "advice": []}
+"""What is said of a part of which nobody knows what was found in it."""
 MOST_TAKES = 4
 """Unfinished takes of one part that are kept; older ones make room."""
 
@@ -61,9 +65,13 @@ class Person:
             Refused: If the file is damaged.
         """
         try:
-            return json.loads((self.folder / CONSENT_FILE).read_text("utf-8"))
-        except (OSError, ValueError) as error:
-            raise Refused("unknown", f"the consent of {self.name} cannot be read.", 404) from error
+            about = parse_json((self.folder / CONSENT_FILE).read_bytes(), CONSENT_FILE, ValueError)
+            said = [about.get(entry, "") for entry in ("language", "consent", VOICE_CONSENT)]
+            if all(isinstance(one, str) for one in said) and said[0] in scripts():
+                return about
+        except (OSError, ValueError, AttributeError):
+            pass
+        raise Refused("unknown", f"the consent of {self.name} cannot be read.", 404)
 
     def check_spoken(self) -> None:
         """Refuses to go on before the person said aloud that they agree.
@@ -175,16 +183,22 @@ class Person:
     def _take(self, id: str, take: str) -> Path:
         if not (take.isascii() and take.isalnum() and len(take) <= 32):
             raise Refused("part", "a take has a name of letters and digits.", 404)
-        return self._parts / f"{checked_id(id)}.{take}{UNFINISHED}"
+        file = self._parts / f"{checked_id(id)}.{take}{UNFINISHED}"
+        if file.is_symlink():
+            raise Refused("part", "a link to elsewhere is no take.", 404)
+        return file
 
     def _takes(self, id: str) -> list[Path]:
         """Unfinished takes of a part, the oldest first."""
-        found = self._parts.glob(f"{id}.*{UNFINISHED}")
-        return sorted(found, key=lambda file: file.stat().st_mtime)
+        return sorted(self._files(f"{id}.*{UNFINISHED}"), key=lambda file: file.stat().st_mtime)
 
     def _kept(self, id: str) -> Path | None:
-        files = self._parts.glob(f"{id}.*")
+        files = self._files(f"{id}.*")
         return next((f for f in files if f.suffix not in (UNFINISHED, ".json")), None)
+
+    def _files(self, pattern: str) -> Iterator[Path]:
+        """Files of the parts; what a link leads to may be anything of this machine."""
+        return (file for file in self._parts.glob(pattern) if not file.is_symlink())
 
     def _make_room(self, id: str) -> None:
         for old in self._takes(id)[: -(MOST_TAKES - 1)]:
@@ -192,9 +206,10 @@ class Person:
 
     def _report(self, id: str) -> dict[str, Any]:
         try:
-            return json.loads((self._parts / f"{id}.json").read_text("utf-8"))
-        except (OSError, ValueError):
-            return {"seconds": 0.0, "turn": None, "advice": []}
+            found = parse_json((self._parts / f"{id}.json").read_bytes(), id, ValueError)
+            return {name: found[name] for name in UNSEEN}
+        except (OSError, ValueError, TypeError, KeyError):
+            return dict(UNSEEN)
 
 
 def checked_id(id: str) -> str:

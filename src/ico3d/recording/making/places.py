@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-FOLDER = "making"
+from ico3d.recording.keeping.person import MAKING
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Places:
     @property
     def folder(self) -> Path:
         """Where everything on the way lies."""
-        return self.person / FOLDER
+        return self.person / MAKING
 
     @property
     def joined(self) -> Path:
