@@ -82,6 +82,7 @@ describe('an answer', () => {
     await page.waitForFunction(() => document.querySelectorAll('#announcer p').length === 2);
     expect(await announced()).toEqual([`You: ${SHORTER}`, `Stella: ${answer}`]);
     expect(await page.getAttribute('#captions', 'aria-hidden')).toBe('true');
+    expect(await page.textContent('#answer')).toBe(answer); // the last sentence alone would often be no answer
     expect(await record()).toEqual([
       expect.stringMatching(/^Stella .*Hello\.$/),
       expect.stringMatching(new RegExp(`^You .*${SHORTER}$`)),
@@ -99,7 +100,50 @@ describe('an answer', () => {
     expect(last).toMatch(/The stars are very far/);
     expect(last).not.toMatch(/children/);
     expect(await page.textContent('#answer .unheard')).toBe('');
+    expect(last.endsWith((await page.textContent('#answer'))!)).toBe(true);
   });
+
+  test.each(['', 'small', 'large'])('shows whole lines, the last one among them (%s)', async (size) => {
+    const { page } = browser;
+    const shown = await page.evaluate((size) => {
+      document.documentElement.dataset.captionsSize = size;
+      const answer = document.getElementById('answer')!;
+      const [heard, next] = answer.children;
+      const before = heard!.textContent;
+      heard!.textContent = 'Words that fill a line, and then another one, and more of them. '.repeat(8);
+      const { clientHeight, scrollHeight } = answer;
+      answer.scrollTop = scrollHeight;
+      const line = parseFloat(getComputedStyle(answer).lineHeight);
+      heard!.textContent = before;
+      delete document.documentElement.dataset.captionsSize;
+      return { lines: clientHeight / line, more: scrollHeight > clientHeight, next: next!.textContent };
+    }, size);
+    expect(shown).toMatchObject({ more: true, next: '' });
+    expect(Math.abs(shown.lines - 4)).toBeLessThan(0.05);
+  });
+});
+
+test('who clicks the button to talk is told that it is held', async () => {
+  const { page } = browser;
+  await page.click('#talk');
+  await page.waitForFunction(() => [...document.querySelectorAll('#notices p')].some(({ textContent }) => textContent === 'Hold to talk'));
+});
+
+test('on a phone she comes back to where there is room again, once captions have been short for some seconds', async () => {
+  const { page } = browser;
+  await page.setViewportSize({ width: 390, height: 844 });
+  const covered = () => page.evaluate(() => (window.ico3d!.stage as unknown as { covered: number }).covered);
+  const ask = (text: string) => page.evaluate((text) => void (document.getElementById('question')!.textContent = text), text);
+  await ask('');
+  await page.waitForTimeout(500);
+  const few = await covered();
+  await ask('a long question '.repeat(40));
+  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: number }).covered > few + 150, few);
+  await ask('');
+  await page.waitForTimeout(1000);
+  expect(await covered()).toBeGreaterThan(few + 150); // the picture does not jump
+  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: number }).covered < few + 20, few, { timeout: 20_000 });
+  await page.setViewportSize({ width: 1280, height: 720 });
 });
 
 describe('the drawer', () => {

@@ -66,6 +66,11 @@ export class TalkRecord {
     this.events.changed(entry);
   }
 
+  /** The last answer, as far as it was heard. */
+  get answered(): string {
+    return this.entries.findLast(({ who }) => who === 'avatar')?.text ?? '';
+  }
+
   /** Whether an answer is being heard. */
   get isOpen(): boolean {
     return this.answer !== null;

@@ -1,13 +1,14 @@
 import { Microphone } from '../audio/microphone.ts';
 import { sentenceOf } from '../errors.ts';
 import type { Heard } from '../face/face.ts';
-import type { ClientMessage, WelcomeMessage } from '../protocol.ts';
+import { MICROPHONE_RATE, type ClientMessage, type WelcomeMessage } from '../protocol.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { VoiceMeter } from './latency.ts';
 import { Listening, type ListeningView } from './listening.ts';
 import { Recovery } from './recovery.ts';
 
 const AGAIN = say('microphone.again');
+const SILENCE = { pieces: 10, milliseconds: 100 }; // that is told when the microphone closes
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 export type MicrophoneState = 'closed' | 'opening' | 'open';
@@ -37,6 +38,7 @@ export class VoiceInput {
   private held = false; // the button to talk is
   private talking = false; // and the server was told
   private closing: ReturnType<typeof setTimeout> | undefined;
+  private silence: ReturnType<typeof setInterval> | undefined;
 
   /** @param heard what leaves the loudspeaker at a moment of the performance clock */
   constructor(
@@ -80,8 +82,10 @@ export class VoiceInput {
   async toggle(): Promise<void> {
     if (this.ended || this.state === 'opening') return;
     this.recovery.cancel();
-    if (this.state === 'open') this.show('closed');
-    else {
+    if (this.state === 'open') {
+      this.fallSilent();
+      this.show('closed');
+    } else {
       this.show('opening');
       this.show((await this.start()) ? 'open' : 'closed');
     }
@@ -156,6 +160,19 @@ export class VoiceInput {
     this.settle(0);
     if (open) this.view.notice(AGAIN);
     return open;
+  }
+
+  /** What was said until the microphone closed is a turn: silence ends it, as when somebody stops talking. */
+  private fallSilent(): void {
+    if (this.talking || this.meter.lastVoice === null) return;
+    let { pieces } = SILENCE;
+    clearInterval(this.silence);
+    this.silence = setInterval(() => {
+      if (pieces-- === 0 || this.isOpen || this.talking || this.ended) return clearInterval(this.silence);
+      const pcm = new Int16Array((MICROPHONE_RATE * SILENCE.milliseconds) / 1000);
+      this.send({ type: 'audio', sample: this.sample, pcm, playing: null, position: 0 });
+      this.sample += pcm.length;
+    }, SILENCE.milliseconds);
   }
 
   private show(state: MicrophoneState): void {

@@ -1,13 +1,14 @@
 import type { Progress } from '../talk/captioning.ts';
 import { byId } from './elements.ts';
 
-/** What the visitor asked and the sentence that the avatar says, word by word as it is heard. */
+/** What the visitor asked and the sentence that the avatar says, word by word as it is heard; then all that was said. */
 export class Captions {
   private readonly root: HTMLElement;
   private readonly asked: HTMLElement;
   private readonly answered: HTMLElement;
   private readonly heardWords = document.createElement('span');
   private readonly nextWords = document.createElement('span'); // keep their place, so that no line jumps
+  private utterance: number | null = null; // that is heard
 
   /** @param lang language of the talk; empty if it is unknown */
   constructor(root: ParentNode, lang: string) {
@@ -23,24 +24,31 @@ export class Captions {
     this.root.hidden = false;
     this.asked.textContent = text;
     this.asked.classList.toggle('partial', !final);
-    if (final) this.write('', '');
+    if (final || this.utterance === null) this.write('', ''); // what is asked now is not what was answered
   }
 
-  heard({ text, heard }: Progress): void {
+  heard({ utterance, text, heard }: Progress): void {
+    this.utterance = utterance;
     this.root.hidden = false;
     this.write(text.slice(0, heard), text.slice(heard));
-    const { answered, nextWords } = this;
-    const line = parseFloat(getComputedStyle(answered).lineHeight);
-    answered.scrollTop = nextWords.offsetTop + line - answered.clientHeight; // the present line is the last one seen
   }
 
-  /** What was not heard is not said any more. */
-  over(): void {
-    this.write(this.heardWords.textContent!, '');
+  /**
+   * What was not heard is not said any more.
+   *
+   * @param said all that was heard of the utterance
+   */
+  over(utterance: number, said: string): void {
+    if (utterance !== this.utterance) return;
+    this.utterance = null;
+    this.write(said, '');
   }
 
   private write(heard: string, next: string): void {
     this.heardWords.textContent = heard;
     this.nextWords.textContent = next;
+    const { answered, nextWords } = this;
+    const line = parseFloat(getComputedStyle(answered).lineHeight);
+    answered.scrollTop = nextWords.offsetTop + line - answered.clientHeight; // the present line is the last one seen
   }
 }

@@ -1,9 +1,11 @@
 import type { Conversation } from '../talk/conversation.ts';
 import type { MicrophoneState } from '../talk/voice-input.ts';
 import type { PageWords } from '../words/page-words.ts';
-import { say } from '../words/text.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
+
+const CLICK = 350; // ms; who clicks the button to talk does not know that it is held
 
 /** Text box, microphone, button to talk, send and stop: what the visitor does. */
 export class Controls {
@@ -36,7 +38,7 @@ export class Controls {
   }
 
   /** Shows itself and lets the visitor act on a conversation. */
-  bind(conversation: Conversation): void {
+  bind(conversation: Conversation, notice: (sentence: Sentence) => void): void {
     this.form.hidden = false;
     focusOn(this.input);
     this.form.onsubmit = (event) => {
@@ -46,7 +48,7 @@ export class Controls {
     };
     this.microphone.onclick = () => void conversation.toggleMicrophone();
     this.stop.onclick = () => conversation.interrupt();
-    this.bindTalk(conversation);
+    this.bindTalk(conversation, notice);
     this.hear('keydown', (event) => {
       if (event.key === 'Escape') conversation.interrupt();
       if (event.key === '/' && this.takesSlash(event)) {
@@ -57,14 +59,19 @@ export class Controls {
   }
 
   /** The button is held with a pointer, or with the space bar wherever that types nothing. */
-  private bindTalk(conversation: Conversation): void {
+  private bindTalk(conversation: Conversation, notice: (sentence: Sentence) => void): void {
+    let since = 0;
     const press = () => void conversation.press();
     const release = () => conversation.release();
     this.talk.onpointerdown = (event) => {
       this.talk.setPointerCapture(event.pointerId);
+      since = event.timeStamp;
       press();
     };
-    this.talk.onlostpointercapture = release;
+    this.talk.onlostpointercapture = (event) => {
+      release();
+      if (event.timeStamp - since < CLICK) notice(say('talk')); // nobody says anything in so short a time
+    };
     this.talk.oncontextmenu = (event) => event.preventDefault(); // a long touch
     this.hear('keydown', (event) => {
       if (event.key !== ' ' || !this.takesSpace(event.target)) return;

@@ -1,30 +1,41 @@
 import { atEnd } from '../lifetime.ts';
 import { byId } from './elements.ts';
 
+const MUCH = 0.1; // of the picture's height, which is a gap when it stays free
+const CALM = 4000; // ms for which it does
+
 /**
  * Tells how many pixels at the lower edge the controls and captions cover, whenever they cover more
  * than before in a picture of this size: what was there once comes again, and the picture must not
- * jump each time. Notices do not count; they go.
+ * jump each time. Much that stays free for some seconds is given back. Notices do not count; they go.
  */
 export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixels: number) => void): void {
   const main = root.querySelector('main')!;
   const picture = byId(root, 'stage');
   let size = '';
   let most = 0;
+  let freeing: ReturnType<typeof setTimeout> | undefined;
   const measure = () => {
     const before = size;
     const { width, height, bottom } = picture.getBoundingClientRect();
     size = `${width}x${height}`;
     const tops = [...main.children].filter(isCover).map((child) => child.getBoundingClientRect().top);
     const covered = Math.max(0, bottom - Math.min(bottom, ...tops));
-    if (size === before && covered <= most) return;
-    most = covered;
-    changed(most);
+    clearTimeout(freeing);
+    const take = () => {
+      most = covered;
+      changed(most);
+    };
+    if (size !== before || covered > most) take();
+    else if (most - covered > MUCH * height) freeing = setTimeout(take, CALM);
   };
   const observer = new ResizeObserver(measure);
   for (const child of main.children) observer.observe(child);
   observer.observe(picture);
-  atEnd(signal, () => observer.disconnect());
+  atEnd(signal, () => {
+    observer.disconnect();
+    clearTimeout(freeing);
+  });
 }
 
 /** Whether an element is seen and lies in the row of the face, not beside it. */

@@ -66,8 +66,8 @@ export function makePage(
       transcript.heard(progress);
     },
     over(utterance, interrupted) {
-      captions.over();
       transcript.record.over(utterance, interrupted);
+      captions.over(utterance, transcript.record.answered);
       announce();
     },
     services(services, offers) {
@@ -93,7 +93,7 @@ export function makePage(
   };
   const talk = (conversation: Conversation) => {
     byId(root, 'state-line').hidden = false;
-    controls.bind(conversation);
+    controls.bind(conversation, view.notice);
     settings.offerCaptions();
     transcript.offer();
     choose = (offer) => conversation.choose(offer);

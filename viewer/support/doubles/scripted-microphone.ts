@@ -91,8 +91,8 @@ export class ScriptedAudio {
   }
 
   /** 32 ms of sound leave the worklet. */
-  sounds(): void {
-    const data = { pcm: new Int16Array(512), end: this.contexts.at(-1)!.currentTime };
+  sounds(pcm = new Int16Array(512)): void {
+    const data = { pcm, end: this.contexts.at(-1)!.currentTime };
     if (this.fault !== 'sound') this.nodes.at(-1)?.port.onmessage?.({ data });
   }
 

@@ -125,6 +125,48 @@ describe('a microphone that was lost', () => {
   });
 });
 
+describe('who turns the microphone off', () => {
+  const acknowledged = () => ScriptedSocket.last.says({ type: 'ack', frames: ScriptedSocket.last.of('audio').length });
+  const after = async (milliseconds: number) => {
+    for (let passed = 0; passed < milliseconds; passed += 100) {
+      acknowledged();
+      await pass(100);
+    }
+    acknowledged();
+  };
+
+  test('has said what was said: a second of silence ends the turn', async () => {
+    await open();
+    for (const level of [10, 8000]) audio.sounds(new Int16Array(512).fill(level));
+    acknowledged();
+    const before = ScriptedSocket.last.of('audio').length;
+    await conversation.toggleMicrophone();
+    expect(audio.records).toBe(false);
+    await after(2000);
+    const silence = ScriptedSocket.last.of('audio').slice(before);
+    expect(silence.map(({ sample }) => sample)).toEqual(Array.from({ length: 10 }, (_, i) => 1024 + 1600 * i));
+  });
+
+  test('and on again speaks on', async () => {
+    await open();
+    for (const level of [10, 8000]) audio.sounds(new Int16Array(512).fill(level));
+    await conversation.toggleMicrophone();
+    await after(300);
+    await open();
+    const before = ScriptedSocket.last.of('audio').length;
+    await after(1000);
+    expect(ScriptedSocket.last.of('audio')).toHaveLength(before);
+  });
+
+  test('and has said nothing, sends nothing more', async () => {
+    await open();
+    const before = ScriptedSocket.last.of('audio').length;
+    await conversation.toggleMicrophone();
+    await after(1000);
+    expect(ScriptedSocket.last.of('audio')).toHaveLength(before);
+  });
+});
+
 test('an open microphone follows the system to a headset, and stays where nothing has changed', async () => {
   await open();
   audio.plug('built in'); // another loudspeaker, perhaps
