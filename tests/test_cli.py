@@ -17,6 +17,8 @@ from ico3d.head.settings import PRESETS, HeadSettings, Network
 from ico3d.scene.settings import SceneSettings
 from ico3d.speech.training.settings import EncoderSettings
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = {
     "train head": HeadSettings,
     "train body": BodySettings,

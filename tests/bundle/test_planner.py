@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.bundle.planner import EASE, SHORTEST, Planner, Start, leg, plan, speed_for, travel
 
+pytestmark = pytest.mark.slow
+
 CLOSE = 1e-6
 
 

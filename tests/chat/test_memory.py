@@ -21,6 +21,8 @@ from support.chat.scripted_talk import ask, talking
 from support.chat.serving import TYPED, serving
 from support.chat.virtual_time import run
 
+pytestmark = pytest.mark.slow
+
 SMALL = Memory(tokens=200)
 
 

@@ -16,6 +16,8 @@ import tyro
 from guides.written_commands import PAGES, ROOT, named, of_script, of_target, shown
 from ico3d import cli
 
+pytestmark = pytest.mark.slow
+
 GROUPED = re.compile(r"--[a-z0-9-]+\.[a-z0-9-]+")
 """An option with the name of its group."""
 SCRIPTS = sorted([*(ROOT / "bench").glob("*.py"), *(ROOT / "bench").glob("*/__main__.py")])

@@ -19,7 +19,7 @@ from ico3d.recording.making.progress import FACE, Progress, write_progress
 from support.needs import needs
 from support.studio_page.parts import part_file
 
-pytestmark = needs("av")
+pytestmark = [needs("av"), pytest.mark.slow]
 KEY = "abcd-efgh-ijkl-mnop"
 HOME = "http://127.0.0.1:8766"
 

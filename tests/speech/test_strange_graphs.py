@@ -10,6 +10,8 @@ from ico3d.bundle.onnx_check import check_onnx
 from ico3d.errors import ModelError
 from ico3d.speech.runtime import SpeechModel
 
+pytestmark = pytest.mark.slow
+
 TIMES = 64  # that a step repeats what it gets
 
 

@@ -16,6 +16,8 @@ from ico3d.splat.render import render
 from support.splats import reference
 from support.splats.reference import camera_at
 
+pytestmark = pytest.mark.slow
+
 PARAMETERS = ("means", "quats", "scales", "opacities", "colors")
 DEVICES = [
     "cpu",

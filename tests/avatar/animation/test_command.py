@@ -15,6 +15,8 @@ from support.bundles.random_bundle import write_random_bundle
 from support.bundles.random_whole import ANIMATION, write_random_whole
 from support.captures import open_with
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def avatar(tmp_path_factory):

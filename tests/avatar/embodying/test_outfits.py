@@ -10,6 +10,8 @@ from ico3d.bundle.skinned.posing import posed, recorded_pose
 from ico3d.errors import BundleError
 from ico3d.motion.roles import cast
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def surfaces(body):

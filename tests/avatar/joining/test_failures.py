@@ -17,6 +17,8 @@ from support.avatars.tiny_joining import assembly_of
 from support.full_disk import files_of_at_most
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 FEW = {"steps_per_frame": 3, "warmup_steps": 3, "checkpoint_every": 4, "density.begin": 5}
 
 

@@ -16,6 +16,8 @@ from ico3d.body.motion.encoder import (
 )
 from ico3d.errors import SettingsError
 
+pytestmark = pytest.mark.slow
+
 SHAPE = EncoderShape(space=(6, 11), time=4, channels=16)
 ODD = EncoderShape(space=(2, 3), time=3, channels=5)  # channels the kernels must pad
 TIME = 0.4

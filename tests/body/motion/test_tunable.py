@@ -9,6 +9,8 @@ import torch
 from ico3d.body.motion.tunable import MlpShape, initial_weights, positional_encoding, tunable_mlp
 from ico3d.errors import SettingsError
 
+pytestmark = pytest.mark.slow
+
 SHAPE = MlpShape(inputs=16)
 ODD = MlpShape(inputs=5, width=9, depth=3, outputs=7, sets=3)  # no whole fours anywhere
 COUNT = 300  # two full blocks of the kernels and a part of one

@@ -14,6 +14,8 @@ from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import job
 from support.full_disk import files_of_at_most
 
+pytestmark = pytest.mark.slow
+
 JOB = job(checkpoint_every=4, **{"finetune.consistency": 0.0})
 
 

@@ -20,6 +20,8 @@ from ico3d.bundle.skinned.posing import (
 from ico3d.rig.quaternions import from_rotvec, multiply, normalized, rotate, to_rotvec
 from support.bundles.random_skinned import random_skinned
 
+pytestmark = pytest.mark.slow
+
 BAKED = random_skinned()
 SECOND = [0.282094792 * math.sqrt(15), 0.282094792 * math.sqrt(5) / 2]
 

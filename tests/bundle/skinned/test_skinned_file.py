@@ -29,6 +29,8 @@ from support.bundles.random_skinned import random_skinned, skinned_manifest, wri
 from support.recorded import body_of, made_still
 from support.rigs import rig_of
 
+pytestmark = pytest.mark.slow
+
 RELAXED = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 BAKED = random_skinned()
 DATA = BAKED.to_bytes()

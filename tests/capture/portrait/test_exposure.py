@@ -17,6 +17,8 @@ from ico3d.capture.portrait.exposure import (
 from ico3d.capture.portrait.files import load_uint8, save_picture
 from ico3d.capture.portrait.readings import Readings
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 12
 
 

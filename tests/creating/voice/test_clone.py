@@ -8,7 +8,10 @@ import pytest
 
 from support.needs import needs
 
-pytestmark = [needs(one) for one in ("pipecat", "torch", "soundfile", "av", "espeakng_loader")]
+pytestmark = [
+    *(needs(one) for one in ("pipecat", "torch", "soundfile", "av", "espeakng_loader")),
+    pytest.mark.slow,
+]
 
 from ico3d.bundle.format import Bundle  # noqa: E402
 from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice  # noqa: E402

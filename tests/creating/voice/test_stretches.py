@@ -7,7 +7,7 @@ import pytest
 
 from support.needs import needs
 
-pytestmark = [needs("pipecat"), needs("espeakng_loader")]
+pytestmark = [needs("pipecat"), needs("espeakng_loader"), pytest.mark.slow]
 
 from ico3d.capture.capture import Sound  # noqa: E402
 

@@ -16,7 +16,7 @@ from ico3d.recording.refusals import Refused
 from support.needs import needs
 from support.studio_page.parts import part_file
 
-pytestmark = [needs("av"), needs("cv2")]
+pytestmark = [needs("av"), needs("cv2"), pytest.mark.slow]
 
 
 class Tracker:

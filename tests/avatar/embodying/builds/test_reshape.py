@@ -20,6 +20,8 @@ from ico3d.motion.roles import INDEX
 from ico3d.rig.quaternions import normalized, to_matrix
 from ico3d.rig.rig import Rig
 
+pytestmark = pytest.mark.slow
+
 OTHERS = ("slender", "sturdy")
 
 
