@@ -1,6 +1,6 @@
 import * as THREE from 'three';
 
-const SPEED = 5.5; // m/s at which what shows the way is thrown
+const SPEED = 3.5; // m/s at which what shows the way is thrown: from a level hand it lands within sight
 const GRAVITY = 9.81; // m/s²
 const DOTS = 24;
 const DOT = 0.012; // m, radius

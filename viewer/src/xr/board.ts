@@ -12,6 +12,8 @@ const WIDE = 0.6; // m, of the board at 1 m
 const UNDER = 0.03; // m at 1 m: between the chin and the board
 const NEARER = 0.75; // of the way from the visitor to the face
 
+const TOLD = ['listening', 'thinking']; // states of a talk
+
 /** A text, whether it is the avatar's, and how many of its letters are seen. */
 interface Said {
   text: string;
@@ -28,6 +30,7 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   text = '';
   private readonly page: ParentNode;
   private hint: string;
+  private way = ''; // back to who is not seen
   private readonly canvas = document.createElement('canvas');
   private readonly texture: THREE.Texture;
   private readonly observer = new MutationObserver(() => this.write());
@@ -48,7 +51,7 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     this.texture = texture;
     this.renderOrder = 1; // over the Gaussians
     [canvas.width, canvas.height] = [WIDTH, HEIGHT];
-    for (const id of ['captions', 'notices']) {
+    for (const id of ['captions', 'notices', 'state']) {
       this.observer.observe(byId(page, id), { subtree: true, childList: true, characterData: true, attributes: true });
     }
     this.write();
@@ -58,6 +61,13 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   dropHint(): void {
     if (!this.hint) return;
     this.hint = '';
+    this.write();
+  }
+
+  /** Says how a visitor who is lost comes back; nothing by an empty text. */
+  guide(way: string): void {
+    if (way === this.way) return;
+    this.way = way;
     this.write();
   }
 
@@ -93,13 +103,20 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     this.texture.needsUpdate = true;
   }
 
-  /** What the page says now: a notice, else the captions; and the hint. */
+  /** That somebody listens or thinks: in space no other thing tells. */
+  private state(): string {
+    const state = byId(this.page, 'state');
+    const { state: name = '' } = state.closest<HTMLElement>('[data-state]')?.dataset ?? {};
+    return TOLD.includes(name) ? state.textContent! : '';
+  }
+
+  /** What the page says now: a notice, else the captions and who listens; and the hint. */
   private read(): Said[] {
     const [captions, notices] = [byId(this.page, 'captions'), byId(this.page, 'notices')];
     const notice = notices.lastElementChild?.textContent;
     const shown = captions.checkVisibility() ? [said(byId(captions, 'question'), false), said(byId(captions, 'answer'), true)] : [];
-    const texts = notice ? [whole(notice, true)] : shown;
-    return [...texts, whole(this.hint, false)].filter(({ text }) => text);
+    const texts = notice ? [whole(notice, true)] : [...shown, whole(this.state(), false)];
+    return [...texts, whole(this.way || this.hint, false)].filter(({ text }) => text);
   }
 }
 

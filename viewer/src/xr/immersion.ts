@@ -16,7 +16,10 @@ const APART = 1.2; // m between those who talk
 const TURN = Math.PI / 6; // rad, at once: smooth turns make people sick
 const USUAL_RATE = 72; // pictures/s, of headsets that do not tell theirs
 const HELD = 0.85; // of the headset's rate: what is less is seen
-const LEAVING = 5; // the upper button of a controller (xr-standard)
+const RETURNING = 4; // the lower button of a controller (xr-standard)
+const LEAVING = 5; // the upper one
+const UNSEEN = Math.PI / 4; // rad aside: what is there is hardly seen
+const LOST = 1.5; // s after which who is not seen is lost
 const MOUTH = 0.07; // m under the eyes
 const CHIN = 0.14;
 
@@ -40,6 +43,7 @@ export class Immersion implements Presentation {
   private readonly head = new THREE.Matrix4(); // of the visitor, in the headset's space
   private aim: { by: XRInputSource; at: THREE.Vector3 } | null = null; // m in the headset's space
   private met = false;
+  private unseen = 0; // s for which the avatar has been out of sight
 
   /**
    * Asks the device for a session and shows the stage in it; needs a click right before.
@@ -158,15 +162,15 @@ export class Immersion implements Presentation {
   /** Stands before the visitor, wherever in their room they are and look to. */
   private meet(): void {
     this.met = true;
-    const ahead = new THREE.Vector3(0, 0, -1).transformDirection(this.head).setY(0).normalize();
     const eye = this.eye();
-    this.rig.meet(eye.clone().addScaledVector(ahead, APART), eye);
+    this.rig.meet(eye.clone().addScaledVector(this.ahead().setY(0).normalize(), APART), eye);
   }
 
   /** Does what a controller's stick and buttons ask for. */
   private steer(source: XRInputSource, frame: XRFrame, space: XRReferenceSpace): void {
     const { gamepad } = source;
     if (!gamepad || gamepad.mapping !== 'xr-standard') return;
+    if (gamepad.buttons[RETURNING]?.pressed) this.met = false;
     if (gamepad.buttons[LEAVING]?.pressed) void this.session.end().catch(() => {});
     const [touchX = 0, touchY = 0, x = touchX, y = touchY] = gamepad.axes;
     if (!this.sticks.has(source)) this.sticks.set(source, new Stick());
@@ -188,7 +192,7 @@ export class Immersion implements Presentation {
   /** The visitor goes somewhere; in a room of their own the avatar does. */
   private go(at: THREE.Vector3): void {
     if (this.passthrough) this.rig.meet(at, this.eye());
-    else this.rig.go(this.rig.localToWorld(at.clone()), this.eye());
+    else this.rig.go(this.rig.localToWorld(at.clone()), this.eye(), this.ahead());
     this.aim = null;
     this.arc.visible = false;
   }
@@ -198,8 +202,20 @@ export class Immersion implements Presentation {
     const head = this.head.clone().premultiply(this.rig.matrixWorld);
     const visitor = new THREE.Vector3().setFromMatrixPosition(head);
     this.glance?.look(visitor, step);
-    this.board.place(visitor, this.face(CHIN), this.ground.up);
+    this.unseen = Math.abs(this.rig.aside(this.eye(), this.ahead())) > UNSEEN ? this.unseen + step : 0;
+    const lost = this.unseen > LOST;
+    this.board.guide(lost && this.canReturn() ? this.ports.words.text(say('xr.return')) : '');
+    this.board.place(visitor, lost ? this.before(head) : this.face(CHIN), this.ground.up);
     this.voice?.place(this.face(MOUTH).applyMatrix4(head.invert()));
+  }
+
+  /** Where a chin would be of somebody who stands before a visitor with this head, m in the world. */
+  private before(head: THREE.Matrix4): THREE.Vector3 {
+    return new THREE.Vector3(0, 0, -APART).applyMatrix4(head).addScaledVector(this.ground.up, -CHIN);
+  }
+
+  private canReturn(): boolean {
+    return [...this.session.inputSources].some(({ gamepad }) => gamepad?.mapping === 'xr-standard');
   }
 
   /** A place under the eyes of the avatar, m in the world. */
@@ -213,6 +229,11 @@ export class Immersion implements Presentation {
   /** Where the visitor's eyes are, m in the headset's space. */
   private eye(): THREE.Vector3 {
     return new THREE.Vector3().setFromMatrixPosition(this.head);
+  }
+
+  /** Where the visitor looks, in the headset's space. */
+  private ahead(): THREE.Vector3 {
+    return new THREE.Vector3(0, 0, -1).transformDirection(this.head);
   }
 
   private hint(): Message {

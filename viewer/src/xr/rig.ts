@@ -1,10 +1,12 @@
 import * as THREE from 'three';
 import type { Ground } from '../stage/camera/ground.ts';
 
-const NEAREST = 0.5; // m between a visitor and the middle of somebody
+const NEAREST = 0.8; // m between a visitor and the middle of somebody
 const FARTHEST = 8; // m
 const CLOSE = 0.05; // m from the eyes from which on something is drawn
 const FAR = 100; // m
+
+const BESIDE = Math.PI / 4; // rad: who is farther aside is hardly seen
 
 /**
  * The headset's own space in the world, where y is up and the floor is at 0: whatever is tracked is
@@ -42,15 +44,32 @@ export class Rig extends THREE.Group {
 
   /**
    * Takes the visitor to a place on the floor, which stays beside the person and in sight of them.
+   * Where the person would be out of the visitor's sight, the visitor is turned to them.
    *
    * @param place m in the world
    * @param head of the visitor, m in the headset's space
+   * @param ahead where the visitor looks, in the headset's space
    */
-  go(place: THREE.Vector3, head: THREE.Vector3): void {
+  go(place: THREE.Vector3, head: THREE.Vector3, ahead: THREE.Vector3): void {
     const way = onFloor(place, this.ground).sub(this.anchor);
     const goal = this.anchor.clone().add(way.clampLength(NEAREST, FARTHEST));
     this.position.add(goal.sub(this.under(head)));
     this.updateMatrixWorld(true);
+    const aside = this.aside(head, ahead);
+    if (Math.abs(aside) > BESIDE) this.turn(aside, head);
+  }
+
+  /**
+   * How far aside of where the visitor looks the person is, rad, positive to the left.
+   *
+   * @param head of the visitor, m in the headset's space
+   * @param ahead where the visitor looks, in the headset's space
+   */
+  aside(head: THREE.Vector3, ahead: THREE.Vector3): number {
+    const { up } = this.ground;
+    const way = this.anchor.clone().sub(this.under(head));
+    const look = ahead.clone().applyQuaternion(this.quaternion).projectOnPlane(up);
+    return Math.atan2(look.clone().cross(way).dot(up), look.dot(way));
   }
 
   /**

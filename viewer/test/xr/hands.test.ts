@@ -10,9 +10,9 @@ describe('what is thrown', () => {
     expect(thrown(from, direction, 0)).toEqual(from);
     const end = thrown(from, direction);
     expect(end.y).toBeCloseTo(0, 12);
-    const seconds = (end.x - from.x) / (5.5 * direction.x);
-    expect(from.y + 5.5 * direction.y * seconds - 0.5 * 9.81 * seconds ** 2).toBeCloseTo(0, 12);
-    expect((end.z - from.z) / (5.5 * direction.z)).toBeCloseTo(seconds, 12);
+    const seconds = (end.x - from.x) / (3.5 * direction.x);
+    expect(from.y + 3.5 * direction.y * seconds - 0.5 * 9.81 * seconds ** 2).toBeCloseTo(0, 12);
+    expect((end.z - from.z) / (3.5 * direction.z)).toBeCloseTo(seconds, 12);
   });
 
   test('lands under a hand that points straight down', () => {

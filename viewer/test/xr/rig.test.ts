@@ -19,6 +19,9 @@ const cases = Array.from({ length: 50 }, () => {
 /** How far a point of the world is above the floor. */
 const height = (point: Vector3, { foot, up }: Ground) => point.clone().sub(foot).dot(up);
 
+/** Where somebody looks who looks at a spot on the floor, level. */
+const ahead = (head: Vector3, spot: Vector3) => spot.clone().sub(head).setY(0).normalize();
+
 const close = (a: Vector3, b: Vector3) => expect(a.distanceTo(b)).toBeLessThan(1e-9);
 
 describe('the space of a headset', () => {
@@ -47,7 +50,7 @@ describe('the space of a headset', () => {
       rig.meet(spot, head);
       const turned = rig.quaternion.clone();
       const goal = eyes.clone().addScaledVector(ground.toward, 3).add(vector(1));
-      rig.go(goal, head);
+      rig.go(goal, head, ahead(head, spot));
       const world = rig.localToWorld(head.clone());
       expect(world.sub(goal).projectOnPlane(ground.up).length()).toBeLessThan(1e-9);
       expect(height(rig.position, ground)).toBeCloseTo(0, 9);
@@ -55,10 +58,32 @@ describe('the space of a headset', () => {
     }
   });
 
-  test.each([[0.1, 0.5], [100, 8]])('does not go into somebody, nor out of sight: %d m become %d m', (wanted, apart) => {
+  test('who went past somebody is turned to them, and stays there', () => {
     for (const { ground, eyes, rig, head, spot } of cases) {
       rig.meet(spot, head);
-      rig.go(eyes.clone().addScaledVector(ground.toward, wanted), head);
+      const look = ahead(head, spot);
+      expect(rig.aside(head, look)).toBeCloseTo(0, 6);
+      const goal = eyes.clone().addScaledVector(ground.toward, -2).add(vector(0.5));
+      rig.go(goal, head, look);
+      const world = rig.localToWorld(head.clone());
+      expect(world.sub(goal).projectOnPlane(ground.up).length()).toBeLessThan(1e-9);
+      expect(rig.aside(head, look)).toBeCloseTo(0, 6);
+    }
+  });
+
+  test('somebody is aside by the angle to the left', () => {
+    for (const { rig, head, spot } of cases) {
+      rig.meet(spot, head);
+      const look = ahead(head, spot);
+      rig.turn(0.4, head); // to the left: who was before the visitor is to the right
+      expect(rig.aside(head, look)).toBeCloseTo(-0.4, 6);
+    }
+  });
+
+  test.each([[0.1, 0.8], [100, 8]])('does not go into somebody, nor out of sight: %d m become %d m', (wanted, apart) => {
+    for (const { ground, eyes, rig, head, spot } of cases) {
+      rig.meet(spot, head);
+      rig.go(eyes.clone().addScaledVector(ground.toward, wanted), head, ahead(head, spot));
       const world = rig.localToWorld(head.clone());
       expect(world.sub(eyes).projectOnPlane(ground.up).length()).toBeCloseTo(apart, 6);
     }
