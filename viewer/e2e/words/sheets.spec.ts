@@ -131,7 +131,6 @@ describe.each(PHONES)('on a phone of %i × %i', (width, height) => {
       await page.screenshot({ path: join(process.env.PICTURES, `${sheet}-${width}.png`) });
     }
     const [part, seen] = [await box(`#${sheet}`), await face()];
-    console.log(sheet, JSON.stringify(part), JSON.stringify(seen));
     expect.soft(overlap(part, seen)).toBe(false);
     const close = await box(`#${sheet} .close`);
     for (const button of await page.locator('.figures > button:visible').all()) expect.soft(overlap(close, await box(button))).toBe(false);
