@@ -26,7 +26,8 @@ test('the sheet shows who serves, and choosing starts anew', async () => {
   const sheet = (await page.locator('#settings').boundingBox())!;
   const beside = sheet.x + sheet.width < views!.x || sheet.x > views!.x + views!.width;
   expect(beside || sheet.y > views!.y + views!.height).toBe(true);
-  expect(sheet.y + sheet.height).toBeLessThan((await page.locator('#composer').boundingBox())!.y);
+  expect(sheet.y).toBeGreaterThan(560 / 2); // in the lower half, and all of it in sight
+  expect(sheet.y + sheet.height).toBeLessThanOrEqual(560);
   await page.evaluate(() => window.draw!());
   const picture = join(folder, 'services.png');
   await page.screenshot({ path: picture });
@@ -34,6 +35,12 @@ test('the sheet shows who serves, and choosing starts anew', async () => {
   for (const kind of ['recognition', 'language', 'voice']) {
     expect(await page.locator(`#services input[name=${kind}]:checked`).count()).toBe(1);
   }
+  expect(await page.locator('#services > fieldset input:enabled').count()).toBe(await page.locator('#services input').count());
+  const others = page.locator('#services > details');
+  expect(await others.locator('summary').textContent()).toBe('Other services, not installed here');
+  expect(await others.locator('li').first().isVisible()).toBe(false); // folded until somebody asks
+  await others.locator('summary').click();
+  expect(await others.locator('li small').first().isVisible()).toBe(true); // what it needs
   await page.evaluate(() => {
     document.querySelector('#services fieldset')!.remove(); // it comes back with a new welcome
     const offer = { kind: 'language', key: 'persona-notes', name: '', hindrance: '' } as const;

@@ -117,7 +117,7 @@ export class Visit {
     const name = nameOf(manifest);
     byId(root, 'name').textContent = name;
     root.style.setProperty('--backdrop', cssColour(manifest.background));
-    showOrigin(root, words, manifest.provenance);
+    showOrigin(root, words, manifest.provenance, signal);
     this.overlay.greet(manifest, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
     this.ports.named(name);
 

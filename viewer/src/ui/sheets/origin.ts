@@ -7,8 +7,8 @@ import { Disclosure } from './disclosure.ts';
 const NOT_STATED = 'not stated';
 
 /** The mark that a machine is seen and heard, and behind it whose likeness the avatar is, who agreed and who made it of what. */
-export function showOrigin(root: ParentNode, words: PageWords, provenance: Provenance): void {
-  new Disclosure(byId(root, 'ai-button'), byId(root, 'origin'));
+export function showOrigin(root: HTMLElement, words: PageWords, provenance: Provenance, signal: AbortSignal): void {
+  new Disclosure(root, 'origin', signal, undefined, 'ai-button');
   const list = byId(root, 'origin').querySelector('dl')!;
   list.replaceChildren(
     ...rowsOf(provenance).flatMap(([name, value]) => {

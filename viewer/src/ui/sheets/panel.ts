@@ -20,13 +20,12 @@ export class Panel {
   private frames = 0;
 
   /** @param figures what drawing takes now */
-  constructor(root: ParentNode, words: PageWords, figures: () => Figures, signal: AbortSignal) {
+  constructor(root: HTMLElement, words: PageWords, figures: () => Figures, signal: AbortSignal) {
     this.words = words;
     this.list = byId(root, 'figures');
     this.table = byId(root, 'latencies');
-    const button = byId(root, 'panel-button');
-    button.append(icon('chart'));
-    new Disclosure(button, byId(root, 'panel'));
+    byId(root, 'panel-button').append(icon('chart'));
+    new Disclosure(root, 'panel', signal);
     every(PERIOD, signal, () => this.figures(figures()));
   }
 

@@ -14,9 +14,8 @@ export class Settings {
 
   constructor(page: HTMLElement, words: PageWords, signal: AbortSignal) {
     this.page = page;
-    const button = byId(page, 'settings-button');
-    button.append(icon('sliders'));
-    new Disclosure(button, byId(page, 'settings'));
+    byId(page, 'settings-button').append(icon('sliders'));
+    new Disclosure(page, 'settings', signal);
     offerLanguages(byId(page, 'language'), words, signal);
     this.announced = this.offer('announced', () => {});
     this.offer('captions-shown', (shown) => (page.dataset.captions = shown ? 'on' : 'off'));

@@ -5,7 +5,7 @@ import { byId } from '../elements.ts';
 
 const KINDS = ['recognition', 'language', 'voice'] as const;
 
-/** Which services there are, which one serves, and what the better ones need. */
+/** Which services may be chosen and which one serves; folded away, what the others need. */
 export class ServiceSheet {
   private readonly sheet: HTMLElement;
   private readonly words: PageWords;
@@ -21,17 +21,39 @@ export class ServiceSheet {
   /** Shows what a server offers; nothing where it offers nothing. */
   show(services: Services, offers: readonly Offer[]): void {
     this.sheet.hidden = offers.length === 0;
-    const groups = KINDS.map((kind) => {
-      const group = document.createElement('fieldset');
-      const legend = document.createElement('legend');
-      this.words.write(legend, say(`services.${kind}`));
-      const rows = offers
-        .filter((offer) => offer.kind === kind)
-        .map((offer) => this.row(offer, services[offer.kind].name === offer.name));
-      group.append(legend, ...rows);
+    const serves = (offer: Offer) => services[offer.kind].name === offer.name;
+    const [here, missing] = split(offers, (offer) => offer.hindrance === '' || serves(offer));
+    const choices = KINDS.map((kind) => {
+      const group = this.named(document.createElement('fieldset'), document.createElement('legend'), kind);
+      group.append(...here.filter((offer) => offer.kind === kind).map((offer) => this.row(offer, serves(offer))));
       return group;
     });
-    this.sheet.replaceChildren(...groups);
+    this.sheet.replaceChildren(...choices, ...(missing.length > 0 ? [this.others(missing)] : []));
+  }
+
+  /** What cannot be chosen, and what it needs. */
+  private others(missing: readonly Offer[]): HTMLDetailsElement {
+    const others = document.createElement('details');
+    const summary = document.createElement('summary');
+    this.words.write(summary, say('services.others'));
+    const lists = KINDS.flatMap((kind) => {
+      const items = missing.filter((offer) => offer.kind === kind).map((offer) => told(document.createElement('li'), offer));
+      if (items.length === 0) return [];
+      const list = document.createElement('ul');
+      list.append(...items);
+      const group = this.named(document.createElement('div'), document.createElement('p'), kind);
+      group.append(list);
+      return [group];
+    });
+    others.append(summary, ...lists);
+    return others;
+  }
+
+  /** A group under the name of a kind of services. */
+  private named<T extends HTMLElement>(group: T, name: HTMLElement, kind: Offer['kind']): T {
+    this.words.write(name, say(`services.${kind}`));
+    group.append(name);
+    return group;
   }
 
   private row(offer: Offer, chosen: boolean): HTMLLabelElement {
@@ -41,16 +63,26 @@ export class ServiceSheet {
     input.name = offer.kind;
     input.value = offer.key;
     input.checked = chosen;
-    input.disabled = offer.hindrance !== '' && !chosen;
     input.onchange = () => this.choose(offer);
-    const name = document.createElement('span');
-    name.textContent = offer.name;
-    row.append(input, name);
-    if (offer.hindrance) {
-      const hindrance = document.createElement('small');
-      hindrance.textContent = offer.hindrance;
-      row.append(hindrance);
-    }
-    return row;
+    row.append(input);
+    return told(row, offer);
   }
+}
+
+/** Two lists: what fulfils a condition, and the rest. */
+function split<T>(all: readonly T[], fulfils: (one: T) => boolean): [T[], T[]] {
+  return [all.filter(fulfils), all.filter((one) => !fulfils(one))];
+}
+
+/** A row with a service's name, and with what prevents it. */
+function told<T extends HTMLElement>(row: T, { name, hindrance }: Offer): T {
+  const title = document.createElement('span');
+  title.textContent = name;
+  row.append(title);
+  if (hindrance) {
+    const hint = document.createElement('small');
+    hint.textContent = hindrance;
+    row.append(hint);
+  }
+  return row;
 }

@@ -37,12 +37,10 @@ export class Transcript {
     this.talker = talker;
     this.list = byId(page, 'record');
     this.record = new TalkRecord({ changed: (entry) => this.changed(entry), cleared: () => this.cleared() });
-    byId(page, 'drawer-close').append(icon('close'));
     byId(page, 'drawer-copy').onclick = () => void this.copy();
     byId(page, 'drawer-save').onclick = () => saveText(this.text(), this.fileName());
     words.onChange(() => this.draw(), signal);
-    const drawer = new Disclosure(byId(page, 'drawer-button'), byId(page, 'drawer'), (open) => this.opened(open));
-    byId(page, 'drawer-close').onclick = () => drawer.close();
+    const drawer = new Disclosure(page, 'drawer', signal, (open) => this.opened(open));
     const press = (event: KeyboardEvent) => event.key.toLowerCase() === 't' && !isForOthers(event) && drawer.toggle();
     page.addEventListener('keydown', press, { signal });
     this.draw();

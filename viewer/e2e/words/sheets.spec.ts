@@ -1,0 +1,171 @@
+import { join } from 'node:path';
+import type { Locator, Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
+import { judge } from '../../support/browser/axe.ts';
+import type { Browser } from '../../support/browser/browser.ts';
+import { refreshed } from '../../support/browser/drawing.ts';
+import { openPage } from '../../support/browser/talk.ts';
+
+const { demoUrl, talkingUrl } = inject('shared');
+const SHEETS = ['panel', 'settings', 'drawer'] as const;
+const PHONES = [
+  [844, 390],
+  [667, 375],
+  [390, 844],
+  [360, 640],
+] as const;
+
+interface Box {
+  left: number;
+  top: number;
+  right: number;
+  bottom: number;
+}
+
+let browser: Browser;
+let page: Page;
+
+beforeAll(async () => {
+  browser = await openPage(demoUrl ?? talkingUrl, { width: 1280, height: 720, calm: true });
+  ({ page } = browser);
+  await page.waitForSelector('#drawer-button:visible');
+});
+
+afterAll(() => browser?.close());
+
+/** The sheets that are open. */
+const open = () => page.evaluate((ids) => ids.filter((id) => !document.getElementById(id)!.hidden), ['origin', ...SHEETS]);
+
+const focused = () => page.evaluate(() => document.activeElement!.id);
+
+/** From the brows to the chin and from ear to ear, in pixels of the page. */
+function face(): Promise<Box> {
+  return page.evaluate(() => {
+    const { stage } = window.ico3d!;
+    const { camera } = stage.orbit;
+    const { eyes } = stage.meeting!;
+    const { left, top, width, height } = document.getElementById('stage')!.getBoundingClientRect();
+    camera.updateMatrixWorld();
+    const at = (right: number, up: number) => {
+      const { x, y } = eyes.clone().add(eyes.clone().set(right, up, 0).applyQuaternion(camera.quaternion)).project(camera);
+      return [left + ((1 + x) * width) / 2, top + ((1 - y) * height) / 2] as const;
+    };
+    const [[x0, y0], [x1, y1]] = [at(-0.075, 0.04), at(0.075, -0.12)];
+    return { left: x0, top: y0, right: x1, bottom: y1 };
+  });
+}
+
+const box = (what: string | Locator): Promise<Box> =>
+  (typeof what === 'string' ? page.locator(what) : what).evaluate((element) => {
+    const { left, top, right, bottom } = element.getBoundingClientRect();
+    return { left, top, right, bottom };
+  });
+
+const overlap = (a: Box, b: Box) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+
+describe('every sheet', () => {
+  test.each(SHEETS)('%s has a name and a ✕; that, Escape from the text box and a click on the picture close it', async (sheet) => {
+    await page.setViewportSize({ width: 1280, height: 720 });
+    const button = `#${sheet}-button`;
+    const ways = [
+      () => page.click(`#${sheet} .close`),
+      async () => {
+        await page.focus('#text');
+        await page.keyboard.press('Escape');
+      },
+      () => page.mouse.click(300, 300),
+    ];
+    for (const close of ways) {
+      await page.click(button);
+      expect(await open()).toEqual([sheet]);
+      expect(await page.textContent(`#${sheet} h2`)).toBe({ panel: 'Figures', settings: 'Settings', drawer: 'Transcript' }[sheet]);
+      await close();
+      expect(await open()).toEqual([]);
+      expect(await focused()).toBe(`${sheet}-button`);
+      expect(await page.getAttribute(button, 'aria-expanded')).toBe('false');
+    }
+  });
+
+  test('stays while the picture is turned, or somebody types', async () => {
+    await page.click('#panel-button');
+    await page.mouse.move(300, 300);
+    await page.mouse.down();
+    await page.mouse.move(340, 300);
+    await page.mouse.move(300, 300 + 20);
+    await page.mouse.up();
+    await page.click('#text');
+    expect(await open()).toEqual(['panel']);
+    expect(await focused()).toBe('text');
+    await page.keyboard.press('Escape');
+    await page.focus('#stage');
+    await page.keyboard.press('Home'); // the camera follows the shape of the picture again
+  });
+
+  test('closes when another one opens, on a desktop and on a phone', async () => {
+    for (const [width, height] of [[1280, 720], [360, 640]] as const) {
+      await page.setViewportSize({ width, height });
+      for (const sheet of ['settings', 'drawer', 'panel', 'drawer', 'origin', 'settings']) {
+        await page.evaluate((sheet) => document.querySelector<HTMLElement>(`[aria-controls=${sheet}]`)!.click(), sheet);
+        expect(await open()).toEqual([sheet]);
+      }
+      await page.keyboard.press('t');
+      expect(await open()).toEqual(['drawer']);
+      await page.keyboard.press('Escape');
+      expect(await open()).toEqual([]);
+    }
+  });
+});
+
+describe.each(PHONES)('on a phone of %i × %i', (width, height) => {
+  test.each(SHEETS)('%s leaves the face and its own ✕ in sight', async (sheet) => {
+    await page.setViewportSize({ width, height });
+    await page.click(`#${sheet}-button`);
+    await page.evaluate(() => {
+      const record = document.getElementById('record')!;
+      const row = record.firstElementChild!;
+      while (record.children.length < 30) record.append(row.cloneNode(true)); // a long talk
+    });
+    await refreshed(page);
+    if (process.env.PICTURES) {
+      await page.evaluate(() => window.draw!());
+      await page.screenshot({ path: join(process.env.PICTURES, `${sheet}-${width}.png`) });
+    }
+    const [part, seen] = [await box(`#${sheet}`), await face()];
+    expect.soft(overlap(part, seen)).toBe(false);
+    const close = await box(`#${sheet} .close`);
+    for (const button of await page.locator('.figures > button:visible').all()) expect.soft(overlap(close, await box(button))).toBe(false);
+    expect.soft(part.bottom).toBeLessThanOrEqual(height);
+    if (width > height) {
+      expect.soft([part.top, part.right, part.bottom]).toEqual([0, width, height]);
+      expect.soft((await box('#stage')).right).toBeLessThanOrEqual(part.left);
+    }
+    await page.click(`#${sheet} .close`);
+    expect(await open()).toEqual([]);
+  });
+
+  test('the buttons keep their order', async () => {
+    const order = () =>
+      page.locator('.figures > button:visible').evaluateAll((buttons) =>
+        buttons
+          .map((button) => ({ id: button.id, ...button.getBoundingClientRect().toJSON() }) as { id: string; x: number; y: number })
+          .sort((a, b) => a.y - b.y || a.x - b.x)
+          .map(({ id }) => id)
+          .filter(Boolean),
+      );
+    const wanted = ['panel-button', 'settings-button', 'drawer-button'];
+    expect(await order()).toEqual(wanted);
+    await page.click('#drawer-button');
+    expect(await order()).toEqual(wanted);
+    await page.click('#drawer-close');
+  });
+});
+
+test('axe finds nothing serious in any sheet', async () => {
+  for (const sheet of SHEETS) {
+    await page.setViewportSize({ width: 1280, height: 720 });
+    await page.click(`#${sheet}-button`);
+    if (sheet === 'settings') await page.locator('#services summary').click();
+    await judge(page, sheet);
+    await page.keyboard.press('Escape');
+  }
+});
