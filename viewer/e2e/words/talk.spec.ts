@@ -135,7 +135,7 @@ test('on a phone she comes back to where there is room again, once captions have
   const covered = () => page.evaluate(() => (window.ico3d!.stage as unknown as { covered: number }).covered);
   const ask = (text: string) => page.evaluate((text) => void (document.getElementById('question')!.textContent = text), text);
   await ask('');
-  await page.waitForTimeout(500);
+  await page.waitForTimeout(1500); // all finds its place
   const few = await covered();
   await ask('a long question '.repeat(40));
   await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: number }).covered > few + 150, few);

@@ -3,6 +3,7 @@ import { byId } from './elements.ts';
 
 const MUCH = 0.1; // of the picture's height, which is a gap when it stays free
 const CALM = 4000; // ms for which it does
+const SETTLING = 1000; // ms after a change of the picture's size, in which all finds its place
 
 /**
  * Tells how many pixels at the lower edge the controls and captions cover, whenever they cover more
@@ -14,6 +15,7 @@ export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixe
   const picture = byId(root, 'stage');
   let size = '';
   let most = 0;
+  let sized = 0; // when the picture got its size, ms
   let freeing: ReturnType<typeof setTimeout> | undefined;
   const measure = () => {
     const before = size;
@@ -26,7 +28,8 @@ export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixe
       most = covered;
       changed(most);
     };
-    if (size !== before || covered > most) take();
+    if (size !== before) sized = performance.now();
+    if (performance.now() - sized < SETTLING || covered > most) take();
     else if (most - covered > MUCH * height) freeing = setTimeout(take, CALM);
   };
   const observer = new ResizeObserver(measure);
