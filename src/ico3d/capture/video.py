@@ -168,7 +168,7 @@ def open_video(path: Path, size: int) -> Video:
             turned = frame is not None and frame.rotation // 90 % 2 == 1
             announced, rate = stream.frames, float(stream.average_rate or 0)
     except (FFmpegError, OSError) as error:
-        raise CaptureError.of("decoding", f"{path}: ", f" ({error})") from error
+        raise CaptureError.of("decoding", f"{path}: ", f" ({error}).") from error
     if frame is None or width * height == 0:
         raise CaptureError.of("no-picture", f"{path}: ")
     scale = min(1.0, size / min(width, height))

@@ -123,7 +123,9 @@ def main() -> int:
     except Ico3dError as error:
         with contextlib.suppress(OSError):  # the log lies on the same disk
             os.write(sys.stderr.fileno(), f"ico3d: {error}\n".encode())
-        return FULL_DISK if error.code == "disk-full" else 1
+        if error.code == "disk-full":
+            os._exit(FULL_DISK)  # an end that writes the log would fail, with a status of its own
+        return 1
     return 0
 
 
