@@ -74,6 +74,10 @@ def broken(kind):
     return read
 
 
+TRIES = 4
+"""A machine that takes pages of libraries back meanwhile hides as much growth, but only once."""
+
+
 @pytest.mark.parametrize(
     ("kind", "finding"),
     [
@@ -89,7 +93,10 @@ def test_the_bench_tells_what_went_wrong(part, kind, finding):
     bounds = part("bounds")
     # only what is judged may be short: a busy machine takes a second to fill 200 MiB
     limits = bounds.Bounds(0.2 if kind == "computes" else 20, 0.5 if kind == "hangs" else 60, 50)
-    outcome = bounds.measure(reader, range(1), 0, limits)
+    for _ in range(TRIES):
+        outcome = bounds.measure(reader, range(1), 0, limits)
+        if outcome.findings:
+            break
     (found,) = outcome.findings
     assert outcome.inputs == 1 and found.startswith(finding) and outcome.first[found] == 0
 
