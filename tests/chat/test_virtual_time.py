@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.chat.observing.monitor import Monitor
+from ico3d.chat.observing.metrics import Monitor
 from ico3d.chat.settings.conversation import ChatSettings, Turns
 from ico3d.chat.wire.protocol import VERSION, Error, Hello, Metrics, Speech, Text
 from ico3d.errors import SettingsError

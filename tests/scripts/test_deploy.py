@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from ico3d import cli
-from ico3d.chat.observing.monitor import Monitor
+from ico3d.chat.observing.metrics import Monitor
 from ico3d.chat.services import choose
 from ico3d.chat.serving.running.ending import LONGEST
 from ico3d.chat.settings.conversation import read_settings

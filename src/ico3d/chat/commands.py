@@ -82,7 +82,7 @@ class Serve:
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.people.provenance import check_consent
         from ico3d.bundle.persona import read_persona
-        from ico3d.chat.observing.monitor import Monitor, TurnLog
+        from ico3d.chat.observing.metrics import Monitor, TurnLog
         from ico3d.chat.parts import make_parts, warm_up
         from ico3d.chat.services.offers import offers
         from ico3d.chat.services.own_voice import unheard

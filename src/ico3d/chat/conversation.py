@@ -26,7 +26,7 @@ from ico3d.chat.activity import Activity
 from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.memory import forget, recall, remembering, remembers_visits
-from ico3d.chat.observing.monitor import Visitor
+from ico3d.chat.observing.metrics import Visitor
 from ico3d.chat.observing.timing import PipelineClock, TurnObserver
 from ico3d.chat.page import Page
 from ico3d.chat.parts import Avatar, Parts, make_aside

@@ -24,7 +24,7 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from prometheus_client.parser import text_string_to_metric_families
 
 from ico3d.chat.frames import SpeechFrame, TypedFrame
-from ico3d.chat.observing.monitor import Monitor, TurnLog
+from ico3d.chat.observing.metrics import Monitor, TurnLog
 from ico3d.chat.observing.timing import PARTS, TurnObserver
 from ico3d.chat.wire.protocol import Metrics
 from ico3d.errors import SettingsError

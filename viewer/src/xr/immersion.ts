@@ -3,7 +3,7 @@ import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
 import type { Presentation } from '../stage/presentation.ts';
 import { say, type Message } from '../words/text.ts';
-import { Arc } from './arc.ts';
+import { Arc } from './teleport.ts';
 import { Board } from './board.ts';
 import { Glance } from './glance.ts';
 import type { XrMode, XrPorts } from './ports.ts';

@@ -1,6 +1,6 @@
 import { Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
-import { thrown } from '../../src/xr/arc.ts';
+import { thrown } from '../../src/xr/teleport.ts';
 import { Stick } from '../../src/xr/stick.ts';
 
 describe('what is thrown', () => {

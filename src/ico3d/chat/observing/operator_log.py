@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from loguru import Message
 
 OWN = "ico3d."
-TOLD = (  # places where pipecat logs the errors of processors, of which `monitor.py` tells
+TOLD = (  # places where pipecat logs the errors of processors, of which `metrics.py` tells
     ("pipecat.processors.frame_processor", "push_error_frame"),
     ("pipecat.pipeline.worker", "_source_push_frame"),
     ("pipecat.pipeline.worker", "_handle_unusable_processor"),

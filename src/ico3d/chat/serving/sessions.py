@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ico3d.chat.conversation import Conversation
-from ico3d.chat.observing.monitor import Monitor, Visitor
+from ico3d.chat.observing.metrics import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
 from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.services.offers import wished

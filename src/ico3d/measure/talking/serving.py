@@ -145,7 +145,7 @@ def main(bundle: str, script: str, turns: str, sessions: str) -> None:
     """Serves with scripted services until the process is ended; arguments are JSON or numbers."""
     jump_on_signal(float(os.environ.get(JUMPING, "0")))
     from ico3d.bundle.format import Bundle
-    from ico3d.chat.observing.monitor import Monitor
+    from ico3d.chat.observing.metrics import Monitor
     from ico3d.chat.observing.operator_log import set_up_log
     from ico3d.chat.serving import server
     from ico3d.chat.serving.sessions import Sessions
