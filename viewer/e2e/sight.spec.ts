@@ -67,6 +67,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     ['a desktop', 1280, 800],
     ['a phone', 390, 844],
     ['a phone on its side', 844, 390],
+    ['a small phone on its side', 667, 375],
     ['a square', 600, 600],
     ['a small frame', 320, 240],
   ])('on %s: the eyes in the upper third, the face large and clear of all controls', async (_, width, height) => {
@@ -84,6 +85,14 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     expect(Math.abs(x - width / height / 2)).toBeLessThan(0.1);
     expect(apart / scale).toBeGreaterThan(0.1); // a face of 22 cm on 80 cm of picture
     expect(Math.min(...tops) / height).toBeGreaterThan(chin);
+    const hair = height > 300 ? 1 : 0.3; // in a small frame buttons lie over the hair
+    const face = { left: x - apart, right: x + apart, top: y - hair * apart, bottom: chin };
+    const over = await page.$$eval('header button', (buttons, [face, height]) => {
+      const boxes = buttons.map((button) => button.getBoundingClientRect()).filter(({ width }) => width > 0);
+      const across = ({ left, right }: DOMRect) => left < face.right * height && right > face.left * height;
+      return boxes.filter((box) => across(box) && box.top < face.bottom * height && box.bottom > face.top * height).length;
+    }, [face, height] as const);
+    expect(over, 'buttons over the face').toBe(0);
   });
 
   test('the wheel makes the face large, under the pointer', async () => {
