@@ -12,7 +12,7 @@ import { ask, Line, QUESTION, silent } from './visitor.ts';
 
 const SIZES = { desk: { width: 1280, height: 800 }, hand: { width: 390, height: 844 } };
 const BOTH_HANDS = ['small', 'big', 'open_hands', 'welcome'];
-const ATTENTION = 1500; // ms from the first words heard on until she is settled in listening
+const ATTENTION = 1500; // ms from the beginning of listening, or of thinking, until it shows
 const { demoUrl } = inject('shared');
 
 interface Told {
@@ -48,6 +48,7 @@ async function moments(album: Album, place: string, size: { width: number; heigh
   await album.shoot(page, `Listening (${place})`);
   line.hold();
   await page.waitForFunction(() => document.body.dataset.state === 'thinking', undefined, { timeout: 60_000 });
+  await page.waitForTimeout(ATTENTION);
   await album.shoot(page, `Thinking (${place})`);
   await browser.close();
 }

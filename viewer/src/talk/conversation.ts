@@ -29,6 +29,8 @@ export interface Acting {
   reset(): void;
   /** Sound of the visitor. */
   listen(pcm: Int16Array): void;
+  /** Whether the avatar listens, thinks, speaks. */
+  attend(state: StateMessage['state']): void;
 }
 
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
@@ -263,6 +265,7 @@ export class Conversation {
 
   private show(state: StateMessage['state']): void {
     this.state = state;
+    this.acting?.attend(state);
     this.view.state(state);
     this.settleWake();
   }

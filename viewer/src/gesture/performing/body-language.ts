@@ -1,12 +1,13 @@
 import { DISPLAY_LEAD } from '../../face/face.ts';
 import type { Spoken } from '../../motion/director.ts';
-import { MICROPHONE_RATE, type Cue } from '../../protocol.ts';
+import { MICROPHONE_RATE, type Cue, type StateMessage } from '../../protocol.ts';
 import type { Vector } from '../../rig/quaternions.ts';
 import type { Rig } from '../../rig/rig.ts';
 import { Living } from '../living.ts';
 import type { RigPose } from '../placement.ts';
 import type { Repertoire } from '../repertoire.ts';
 import { Retarget } from '../retarget.ts';
+import { Attention } from './attention.ts';
 import { roundedRelease, type Direction } from './cues.ts';
 import { directionTo, Gaze } from './gaze.ts';
 import { Listener, Loudness } from './listening.ts';
@@ -25,6 +26,7 @@ export class BodyLanguage {
   private readonly retarget: Retarget;
   private readonly performer: Performer;
   private readonly gaze = new Gaze();
+  private readonly attention: Attention;
   private readonly listener: Listener;
   private readonly loudness = new Loudness(MICROPHONE_RATE);
   private readonly own: Clock = { offset: 0 }; // clock of gestures that the page itself decides on
@@ -41,6 +43,7 @@ export class BodyLanguage {
     this.eyes = figure.eyes;
     this.retarget = new Retarget(rig, figure);
     this.performer = new Performer(new Living(figure, seed), clips);
+    this.attention = new Attention(seed);
     this.listener = new Listener(seed);
   }
 
@@ -59,11 +62,18 @@ export class BodyLanguage {
   /** Stops all utterances, as a new session numbers them from 0 again. */
   reset(): void {
     for (const utterance of [...this.clocks.keys()]) this.stop(utterance);
+    this.attend('idle');
   }
 
   /** Sets the position of the visitor, m in rest space. */
   look(visitor: Vector): void {
-    this.gaze.look(...directionTo(this.eyes, visitor));
+    const [yaw, pitch] = directionTo(this.eyes, visitor);
+    this.gaze.look(yaw, pitch, this.attention.at(this.now));
+  }
+
+  /** Shows from now on that the person listens, thinks, or does neither. */
+  attend(state: StateMessage['state']): void {
+    this.attention.attend(state, this.now);
   }
 
   /** Takes sound of the visitor (int16 at MICROPHONE_RATE); after phrases the person may nod, unless speaking. */

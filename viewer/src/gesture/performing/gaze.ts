@@ -1,5 +1,6 @@
 import { multiply, subtract, type Quat, type Vector } from '../../rig/quaternions.ts';
 import { about } from '../turning.ts';
+import type { Bearing } from './attention.ts';
 
 const RADIANS = Math.PI / 180;
 const TICK = 0.01; // s of a simulation step; steps are fixed, so motion does not depend on the frame rate
@@ -10,9 +11,11 @@ const CHEST_FROM = 15 * RADIANS; // angle of the visitor above which the chest t
 const CHEST_PART = 0.4; // share of the angle beyond CHEST_FROM by which the chest turns
 const HEAD_SPEED = 140 * RADIANS; // largest speed per second
 const CHEST_SPEED = 45 * RADIANS; // largest speed per second
+const TILT_SPEED = 30 * RADIANS; // largest speed per second
 const HEAD_STIFF = 7; // natural frequency with which the head follows, 1/s
-const CHEST_STIFF = 3; // natural frequency with which the chest follows, 1/s
+const CHEST_STIFF = 3; // natural frequency with which the chest follows, and the head tilts, 1/s
 const BEHIND = 120 * RADIANS; // a visitor beyond this angle is behind: the person stays turned to the side of leaving
+const STRAIGHT: Bearing = { yaw: 0, pitch: 0, tilt: 0 };
 
 /** An angle that follows a target, critically damped and with limited speed. */
 class Hinge {
@@ -39,21 +42,31 @@ export class Gaze {
   private steps = 0;
   private yaw = 0;
   private pitch = 0;
+  private tilt = 0;
   private readonly chest = new Hinge(CHEST_STIFF, CHEST_SPEED);
   private readonly head = new Hinge(HEAD_STIFF, HEAD_SPEED);
   private readonly nod = new Hinge(HEAD_STIFF, HEAD_SPEED);
+  private readonly lean = new Hinge(CHEST_STIFF, TILT_SPEED);
 
-  /** Sets the direction of the visitor: radians to the person's left, and downwards. */
-  look(yaw: number, pitch: number): void {
-    this.yaw = Math.abs(yaw) <= BEHIND ? yaw : BEHIND * Math.sign(this.yaw || yaw);
-    this.pitch = pitch;
+  /**
+   * Sets the direction of the visitor, and how the head is held besides.
+   *
+   * @param yaw radians to the person's left
+   * @param pitch radians downwards
+   */
+  look(yaw: number, pitch: number, besides: Bearing = STRAIGHT): void {
+    const toward = Math.abs(yaw) <= BEHIND ? yaw : BEHIND * Math.sign(this.yaw || yaw);
+    this.yaw = toward + besides.yaw;
+    this.pitch = pitch + besides.pitch;
+    this.tilt = besides.tilt;
   }
 
   /** Local rotations of chest, neck and head at a time, s; times must not descend from call to call. */
   at(time: number): [Quat, Quat, Quat] {
     for (; this.steps * TICK < time - 1e-9; this.steps++) this.step();
     const half = multiply(about([0, 1, 0], 0.5 * this.head.angle), about([1, 0, 0], 0.5 * this.nod.angle));
-    return [about([0, 1, 0], this.chest.angle), half, half];
+    const held = multiply(half, about([0, 0, 1], -0.5 * this.lean.angle)); // about the way that the face looks
+    return [about([0, 1, 0], this.chest.angle), held, held];
   }
 
   private step(): void {
@@ -61,6 +74,7 @@ export class Gaze {
     this.chest.step(Math.sign(this.yaw) * Math.min(beyond, CHEST_YAW));
     this.head.step(clamp(this.yaw - this.chest.angle, HEAD_YAW));
     this.nod.step(clamp(this.pitch, HEAD_PITCH));
+    this.lean.step(this.tilt);
   }
 }
 
