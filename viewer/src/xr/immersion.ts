@@ -7,12 +7,11 @@ import { Arc } from './teleport.ts';
 import { Board } from './board.ts';
 import { Glance } from './glance.ts';
 import type { XrMode, XrPorts } from './ports.ts';
-import { Rig } from './rig.ts';
+import { APART, Rig } from './rig.ts';
 import { VoiceInSpace } from './sound.ts';
 import { Stick } from './stick.ts';
 import { Tools } from './tools.ts';
 
-const APART = 1.2; // m between those who talk
 const TURN = Math.PI / 6; // rad, at once: smooth turns make people sick
 const USUAL_RATE = 72; // pictures/s, of headsets that do not tell theirs
 const HELD = 0.85; // of the headset's rate: what is less is seen

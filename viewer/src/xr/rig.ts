@@ -1,6 +1,7 @@
 import * as THREE from 'three';
 import type { Ground } from '../stage/camera/ground.ts';
 
+export const APART = 1.2; // m between those who talk, at first
 const NEAREST = 0.8; // m between a visitor and the middle of somebody
 const FARTHEST = 8; // m
 const CLOSE = 0.05; // m from the eyes from which on something is drawn
