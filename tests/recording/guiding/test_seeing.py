@@ -110,7 +110,7 @@ def test_a_turn_that_is_too_small_is_told(eye, tmp_path):
     }
     assert short_of("left", [0.0, 25.0, 0.0, 0.0]) == short_of("text-1", [0.0] * 4) == []
     (short,) = short_of("down", [0.0, 0.0, -4.5, 9.0])
-    assert str(short) == "the head was turned down by 4°: 9° shows enough of it."
+    assert str(short) == "turn the head further down: it was turned by 4°, and 9° are enough."
 
 
 @pytest.mark.parametrize(

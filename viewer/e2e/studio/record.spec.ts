@@ -98,7 +98,18 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   await page.click('#close');
   await record(5); // a retake, long enough to pass for a whole video
   expect(statSync(join(parts, 'text-1.webm')).mtimeMs).toBe(first);
+  let look = () => {};
+  const looked = new Promise<void>((resolve) => (look = resolve));
+  await page.route('**/keep', async (route) => {
+    await looked;
+    await route.continue();
+  });
   await page.click('#record');
+  await expect.poll(() => page.textContent('#clock'), PATIENCE).toBe('Saving …');
+  for (const button of ['#record', '#remove', '#upload', '#go']) expect(await page.isDisabled(button), button).toBe(true);
+  await page.click('[data-part=text-2]');
+  expect(await page.getAttribute('[data-part=text-1]', 'aria-pressed')).toBe('true'); // nothing else begins meanwhile
+  look();
   await expect.poll(() => statSync(join(parts, 'text-1.webm')).mtimeMs, PATIENCE).toBeGreaterThan(first);
   await expect.poll(() => filesOf('text-1'), PATIENCE).toEqual(['text-1.json', 'text-1.webm']);
   await page.waitForSelector('#play:visible');
@@ -147,8 +158,12 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
 
   await again.click('#delete');
   await again.waitForSelector('#start:visible');
+  await again.waitForSelector('#problem.told');
   expect(await again.textContent('#problem')).toBe('Everything of Ida is gone.');
   expect(readdirSync(folder)).toEqual(['notes.txt']);
+  await again.goBack(); // to an address of hers
+  await again.waitForSelector('#problem.told');
+  expect(await again.textContent('#problem')).toBe('Everything of Ida is gone.');
 }, 120_000);
 
 test.skipIf(!demo)('a voice is agreed to by a tick of its own, off at first, in the language of the page', async () => {

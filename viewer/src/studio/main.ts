@@ -33,6 +33,7 @@ const recordings = new Recordings(server);
 const place = new Place();
 let overview: Overview | null = null;
 let person: Status | null = null;
+const deleted = new Set<string>(); // whom this page has deleted, and nobody else
 
 const ports = {
   words,
@@ -76,8 +77,15 @@ async function leaveIfGone(): Promise<void> {
 /** Says of somebody whose recordings are gone that a new one can begin. */
 async function leaveDeleted(name: string): Promise<void> {
   await showStart();
-  problem(say('studio.gone', { name }));
+  tellDeleted(name);
   byId(root, 'name').focus();
+}
+
+/** Says that somebody is gone: as wished, or to the surprise of whoever looks at the page. */
+function tellDeleted(name: string): void {
+  const isWished = deleted.has(name);
+  problem(say(isWished ? 'studio.deleted' : 'studio.gone', { name }));
+  byId(root, 'problem').classList.toggle('told', isWished);
 }
 
 /** Looks what has become of the person meanwhile, unless something of them is on its way. */
@@ -101,6 +109,7 @@ function show(...sections: string[]): void {
 /** Shows a person: what is recorded, and the avatar as it is made. */
 function showPerson(status: Status): void {
   person = status;
+  deleted.delete(status.name); // begun anew
   place.open(status.name);
   const state = status.making?.state;
   show(...(state || status.avatar ? ['making'] : []), ...(state === 'running' ? [] : ['room']));
@@ -196,20 +205,27 @@ byId(root, 'back').onclick = () => {
   void showStart().catch(failed);
 };
 byId(root, 'delete').onclick = async () => {
-  const { name } = person!;
+  const leaving = person!;
+  const { name } = leaving;
   if (!confirm(words.text(say('studio.delete.sure', { name })))) return;
+  person = null; // that they are gone is no surprise now
+  making.show(null);
   try {
     await recordings.delete(name);
+    deleted.add(name);
     await showStart();
-    problem(say('studio.deleted', { name }));
-    byId(root, 'problem').classList.add('told');
+    tellDeleted(name);
   } catch (error) {
+    showPerson(leaving);
     failed(error);
   }
 };
 addEventListener('popstate', () => {
   problem(null);
   void showPlace().catch(failed);
+});
+addEventListener('beforeunload', (event) => {
+  if (room.isBusy) event.preventDefault(); // the browser asks whether to leave
 });
 addEventListener('pageshow', ({ persisted }) => persisted && void watch()); // the browser's Back
 document.addEventListener('visibilitychange', () => void watch());

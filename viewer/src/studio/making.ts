@@ -103,6 +103,7 @@ export class MakingView {
     byId(root, 'steps').replaceChildren(...(making ? STEPS.map((step, number) => this.entry(step, number, making)) : []));
     byId(root, 'steps').hidden = state === 'made';
     this.showFace(status.name, making?.faces ?? 0);
+    words.write(byId(root, 'caption'), say(isRunning ? 'studio.making.face' : 'studio.making.face.made'));
     const decibels = making?.decibels ?? null;
     words.write(byId(root, 'decibels'), decibels === null ? '' : say('studio.making.decibels', { n: Math.round(10 * decibels) / 10 }));
     byId(root, 'halt').hidden = byId(root, 'closing').hidden = !isRunning;

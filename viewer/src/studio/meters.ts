@@ -19,7 +19,7 @@ export function showMeters(list: HTMLElement, words: PageWords, status: Status, 
   const reading = now && isNew ? Math.min(1, now.seconds / TEXT) : 0;
   const time = seconds + (now && now.part !== 'consent' ? now.seconds : 0);
   list.replaceChildren(
-    ...row(words, say('studio.meter.time'), time / enough, say('studio.meter.seconds', { n: Math.round(time), all: enough })),
+    ...row(words, say('studio.meter.time'), time / enough, say('studio.meter.seconds', { n: Math.min(Math.round(time), enough), all: enough })),
     ...row(words, say('studio.meter.texts'), (read + reading) / texts.length, say('studio.meter.of', { n: read, all: texts.length })),
     ...turnRow(words, turns),
   );

@@ -31,6 +31,7 @@ export class Room {
   private status: Status | null = null;
   private current = '';
   private sending: Sending | null = null;
+  private saving = false; // a part has ended, and the server looks at it
   private began = 0; // ms, of the recording
   private looking = false;
   private most = 0; // of the turn that is being recorded, 0 to 1
@@ -45,6 +46,7 @@ export class Room {
     this.on('salvage', () => this.change((name, { id, take }) => ports.recordings.keep(name, id, take!)));
     this.on('remove', () => this.change((name, { id }) => ports.recordings.remove(name, id)));
     this.on('next', async () => this.advance());
+    this.on('onward', async () => byId(root, 'make').scrollIntoView({ behavior: 'smooth' }));
     this.on('play', () => this.play());
     this.on('close', async () => byId<HTMLDialogElement>(root, 'shown').close());
     this.on('upload', async () => byId(root, 'file').click());
@@ -87,9 +89,9 @@ export class Room {
     this.write();
   }
 
-  /** Whether the camera records, or a video is on its way. */
+  /** Whether the camera records, or a part or a video is on its way. */
   get isBusy(): boolean {
-    return this.sending !== null;
+    return this.sending !== null || this.saving;
   }
 
   private showFirst(status: Status, part: string | null): void {
@@ -143,16 +145,30 @@ export class Room {
   /** Ends a part and keeps it; the next one follows. */
   private async finish(): Promise<void> {
     const sending = this.sending;
+    if (!sending) return;
     this.sending = null;
-    await this.camera.stop();
-    this.write();
-    this.ports.words.write(byId(this.root, 'clock'), say('studio.saving'));
     try {
-      if (sending) this.ports.changed(await sending.keep());
+      const status = await this.saved(sending);
+      if (this.status?.name !== status.name) return; // the page was left for another one
+      this.ports.changed(status);
       if (this.part?.advice?.length === 0) this.advance(); // else it is read first
     } catch (error) {
       this.ports.failed(error);
       if (this.status) this.ports.changed(await this.ports.recordings.status(this.status.name));
+    }
+  }
+
+  /** Ends a part and has it looked at; until then nothing else is done to the parts. */
+  private async saved(sending: Sending): Promise<Status> {
+    this.saving = true;
+    this.write();
+    try {
+      await this.camera.stop();
+      this.write();
+      this.ports.words.write(byId(this.root, 'clock'), say('studio.saving'));
+      return await sending.keep();
+    } finally {
+      this.saving = false;
     }
   }
 
@@ -226,7 +242,7 @@ export class Room {
   }
 
   private select(id: string): void {
-    if (this.camera.isRecording) return;
+    if (this.camera.isRecording || this.saving) return;
     this.current = id;
     this.ports.chosen(id);
     this.most = 0;
@@ -259,14 +275,15 @@ export class Room {
   }
 
   private tell({ word, turned }: Told): void {
-    const key = `studio.guide.${word}`;
+    const wanted = turned?.[this.current as keyof Turns];
+    this.most = Math.max(this.camera.isRecording ? this.most : 0, wanted ?? 0);
+    const isEnough = this.camera.isRecording && this.most >= 1 && (word === this.current || word === 'good');
+    const key = `studio.guide.${isEnough ? 'enough' : word}`;
     const guide = byId(this.root, 'guide');
     this.ports.words.write(guide, isKey(key) && this.camera.isOpen ? say(key) : '');
-    guide.dataset.word = word;
-    const wanted = turned?.[this.current as keyof Turns];
+    guide.dataset.word = isEnough ? 'good' : word;
     const reached = byId<HTMLProgressElement>(this.root, 'reached');
     reached.hidden = wanted === undefined;
-    this.most = Math.max(this.camera.isRecording ? this.most : 0, wanted ?? 0);
     reached.value = this.most;
   }
 
@@ -294,14 +311,16 @@ export class Room {
     byId(root, 'view').hidden = part.id === UPLOAD;
     byId(root, 'salvage').hidden = camera.isRecording || part.state !== 'broken';
     byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || this.isComplete(status);
+    byId(root, 'onward').hidden = camera.isRecording || !this.isEnough(status);
     byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
+    for (const id of ['record', 'salvage', 'remove', 'upload']) byId<HTMLButtonElement>(root, id).disabled = this.saving;
     showAdvice(byId(root, 'advice'), words, part.advice ?? []);
     byId(root, 'parts').replaceChildren(...status.parts.filter(isListed).map((one) => this.entry(one)));
     this.measure(0);
     words.write(byId(root, 'sounds'), soundsOf(status.covered));
     byId(root, 'covered').hidden = this.isBrought; // the parts do not count then
     this.writeMake(status);
-    byId<HTMLButtonElement>(root, 'upload').disabled = !this.isAgreed;
+    byId<HTMLButtonElement>(root, 'upload').disabled ||= !this.isAgreed;
     if (!camera.isOpen) this.hush('studio.camera.off');
     byId(root, 'reached').hidden ||= !camera.isOpen;
   }
@@ -320,7 +339,7 @@ export class Room {
     const { making } = status;
     const isSame = making?.state === 'made' && making.changed.length === 0 && making.quality === this.quality;
     const go = byId<HTMLButtonElement>(this.root, 'go');
-    go.disabled = !ready || isSame || this.camera.isRecording;
+    go.disabled = !ready || isSame || this.camera.isRecording || this.saving;
     words.write(go, say(isOver(status) ? 'studio.making.anew' : making || status.avatar ? 'studio.make.again' : 'studio.make'));
     words.write(byId(this.root, 'first'), isSame ? say('studio.make.same') : ready ? this.more(status) : say('studio.make.first'));
   }
@@ -340,8 +359,13 @@ export class Room {
   }
 
   /** What is said of an avatar that could be made: that more would be better, as long as it would. */
-  private more({ covered }: Status): Sentence {
-    return this.isBrought || covered.seconds >= covered.enough ? '' : say('studio.make.more');
+  private more(status: Status): Sentence {
+    return this.isEnough(status) ? '' : say('studio.make.more');
+  }
+
+  /** Whether an avatar can be made that would hardly be better of more. */
+  private isEnough(status: Status): boolean {
+    return this.isReady(status) && (this.isBrought || status.covered.seconds >= status.covered.enough);
   }
 
   private isComplete({ parts }: Status): boolean {

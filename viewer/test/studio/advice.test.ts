@@ -11,7 +11,7 @@ test('advice is said in the language of the page, with its values and its second
   expect(textOf(adviceOf(LIPS), 'de')).toBe('Die Lippen bewegen sich kaum: Lesen Sie etwas laut vor.');
   expect(textOf(adviceOf({ ...LIPS, spans: [[3.1, 3.2], [7, 9.2]] }), 'en')).toBe('At 3, 7–9 s: The lips hardly move: read something aloud.');
   const short = { code: 'short-left', values: { n: 7, goal: 20 }, spans: [] };
-  expect(textOf(adviceOf(short), 'es')).toBe('La cabeza giró 7° a la izquierda: 20° muestran lo suficiente.');
+  expect(textOf(adviceOf(short), 'es')).toBe('Gire más la cabeza a la izquierda: giró 7° y bastan 20°.');
 });
 
 test('of many seconds the first are told, and how many more there are', () => {

@@ -52,10 +52,14 @@ TEXTS: dict[str, str] = {
         "there are {n} pictures per second: give more light, or choose 25 or 30 in the camera's "
         "settings."
     ),
-    "short-down": "the head was turned down by {n}°: {goal}° shows enough of it.",
-    "short-left": "the head was turned to the left by {n}°: {goal}° shows enough of it.",
-    "short-right": "the head was turned to the right by {n}°: {goal}° shows enough of it.",
-    "short-up": "the head was turned up by {n}°: {goal}° shows enough of it.",
+    "short-down": "turn the head further down: it was turned by {n}°, and {goal}° are enough.",
+    "short-left": (
+        "turn the head further to the left: it was turned by {n}°, and {goal}° are enough."
+    ),
+    "short-right": (
+        "turn the head further to the right: it was turned by {n}°, and {goal}° are enough."
+    ),
+    "short-up": "turn the head further up: it was turned by {n}°, and {goal}° are enough.",
     "sound-clipped": "the sound is clipped: speak softer, or move away from the microphone.",
     "sound-noise": (
         "noise is nearly as loud as the voice, or there is no pause: find a quiet room, and be "
