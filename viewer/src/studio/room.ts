@@ -5,7 +5,8 @@ import { showAdvice } from './advice.ts';
 import { Camera } from './camera.ts';
 import { Bodies, type BodyPorts } from './bodies.ts';
 import { showMeters, soundsOf } from './meters.ts';
-import { partName, type Overview, type Part, type Status, type Told, type Turns } from './recordings.ts';
+import { isAgreed, showParts } from './parts.ts';
+import type { Overview, Part, Status, Told, Turns } from './recordings.ts';
 import { Sending } from './sending.ts';
 
 const LOOKED = 400; // ms between two pictures for guidance
@@ -315,7 +316,7 @@ export class Room {
     byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
     for (const id of ['record', 'salvage', 'remove', 'upload']) byId<HTMLButtonElement>(root, id).disabled = this.saving;
     showAdvice(byId(root, 'advice'), words, part.advice ?? []);
-    byId(root, 'parts').replaceChildren(...status.parts.filter(isListed).map((one) => this.entry(one)));
+    showParts(byId(root, 'parts'), words, status.parts, this.current, (id) => this.select(id));
     this.measure(0);
     words.write(byId(root, 'sounds'), soundsOf(status.covered));
     byId(root, 'covered').hidden = this.isBrought; // the parts do not count then
@@ -346,7 +347,7 @@ export class Room {
 
   /** Whether the person said that they agree: that comes before all else. */
   private get isAgreed(): boolean {
-    return this.status!.parts.some(({ id, state }) => id === 'consent' && state === 'kept');
+    return isAgreed(this.status!.parts);
   }
 
   private isReady({ parts }: Status): boolean {
@@ -371,32 +372,9 @@ export class Room {
   private isComplete({ parts }: Status): boolean {
     return parts.every(({ id, state }) => id === UPLOAD || state === 'kept');
   }
-
-  /** A part in the list: chosen by pressing it. */
-  private entry(part: Part): HTMLLIElement {
-    const { words } = this.ports;
-    const [row, button, name, state] = (['li', 'button', 'span', 'span'] as const).map((tag) => document.createElement(tag));
-    words.write(name!, partName(part.id));
-    const shown = part.advice?.length ? 'better' : part.state;
-    words.write(state!, say(`studio.state.${shown}`, part.seconds === undefined ? undefined : { n: Math.round(10 * part.seconds) / 10 }));
-    button!.dataset.part = part.id;
-    button!.dataset.state = part.state;
-    button!.dataset.shown = shown;
-    button!.ariaPressed = String(part.id === this.current);
-    (button as HTMLButtonElement).disabled = part.id !== 'consent' && !this.isAgreed;
-    button!.append(name!, state!);
-    button!.onclick = () => this.select(part.id);
-    row!.append(button!);
-    return row as HTMLLIElement;
-  }
 }
 
 /** Whether a making has ended without an avatar. */
 function isOver({ making }: Status): boolean {
   return making?.state === 'stopped' || making?.state === 'failed';
-}
-
-/** Whether a part is listed: a video that was brought only if there is one. */
-function isListed({ id, state }: Part): boolean {
-  return id !== UPLOAD || state !== 'missing';
 }

@@ -105,9 +105,8 @@ export function makePage(
 
 /** Says plainly which services are the small offline ones. */
 function showStandIns(root: ParentNode, words: PageWords, services: Services): void {
-  const names = Object.values(services)
-    .filter((service) => service.stand_in)
-    .map((service) => service.name);
+  const simple = (['recognition', 'language', 'voice'] as const).filter((kind) => services[kind].stand_in);
+  const names = simple.map((kind) => say(`stand-ins.${kind}`));
   const note = byId(root, 'stand-ins');
   note.hidden = names.length === 0;
   words.write(note, say('stand-ins', { names }));

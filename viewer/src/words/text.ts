@@ -19,7 +19,7 @@ export function addTexts(more: Texts): void {
   TEXTS = { ...TEXTS, ...more };
 }
 
-export type Values = Readonly<Record<string, string | number | Message | readonly string[]>>;
+export type Values = Readonly<Record<string, string | number | Message | readonly (string | Message)[]>>;
 
 /** A sentence of the page, before anybody knows in which language. */
 export interface Message {
@@ -76,5 +76,5 @@ function valueOf(value: Values[string] | undefined, language: Language): string 
   if (value === undefined) throw new Error('a text lacks one of its values');
   if (typeof value === 'number') return new Intl.NumberFormat(language).format(value);
   if (typeof value === 'string' || !('length' in value)) return textOf(value, language);
-  return new Intl.ListFormat(language, { type: 'unit' }).format(value);
+  return new Intl.ListFormat(language, { type: 'unit' }).format(value.map((one) => textOf(one, language)));
 }

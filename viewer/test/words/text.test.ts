@@ -65,7 +65,7 @@ describe('a sentence', () => {
   });
 
   test('lists what there are several of', () => {
-    expect(textOf(say('stand-ins', { names: ['A', 'B'] }), 'de')).toBe('Einfache Offline-Dienste: A, B');
+    expect(textOf(say('stand-ins', { names: ['A', say('stand-ins.voice')] }), 'de')).toBe('Einfach gehalten, um offline zu laufen: A, Stimme');
   });
 
   test('of somebody else stays as it is, and a value that is missing is no secret', () => {
