@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.capture import decoding
 from ico3d.capture.capture import Sound
+from ico3d.capture.decoding import check_size
 from ico3d.capture.sound import check_claim
 from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
 SOUND_RATE = 16_000
-MOST_PIXELS = 8192 * 4320
-"""Largest size of a video's pictures: what cameras record at most."""
 FORMATS = (
     "mov,mp4,matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,ivf,flv,asf,ogg,mxf,nut,gif,"
     "dv,rm,y4m,yuv4mpegpipe"
@@ -95,7 +95,6 @@ class Video:
         with opened(self.path) as container:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
-            _limit(stream)
             first = None
             for frame in decoded_frames(container, stream):
                 if frame is None:
@@ -126,19 +125,26 @@ def _is_near(wanted: float, taken: float, fps: float) -> bool:
 def opened(path: Path) -> Any:
     """A PyAV container of a file, which cannot make FFmpeg open another file or an address.
 
+    Its decoders refuse larger pictures than the file states, which would fill the memory.
+
     Raises:
+        CaptureError: If the file states larger pictures than are taken (`decoding.check_size`).
         FFmpegError: If it is no video, or is a play list.
         OSError: If it cannot be read.
     """
     import av
 
     bounds = {"format_whitelist": FORMATS, "protocol_whitelist": "file"}
-    return av.open(str(path), metadata_errors="replace", container_options=bounds)
-
-
-def _limit(stream: Any) -> None:
-    """Has the decoder refuse larger pictures than the file states, which would fill the memory."""
-    stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+    container = av.open(str(path), metadata_errors="replace", container_options=bounds)
+    try:
+        for stream in container.streams.video:
+            if stream.codec_context is not None:
+                check_size(str(path), stream.codec_context.width, stream.codec_context.height)
+                stream.codec_context.options = {"max_pixels": str(decoding.MOST_PIXELS)}
+    except CaptureError:
+        container.close()
+        raise
+    return container
 
 
 def open_video(path: Path, size: int) -> Video:
@@ -149,7 +155,8 @@ def open_video(path: Path, size: int) -> Video:
         size: Upper limit of the pictures' short side in pixels; larger videos are scaled down.
 
     Raises:
-        CaptureError: If the file is missing, is no video, or cannot be opened.
+        CaptureError: If the file is missing, is no video, cannot be opened, or has larger pictures
+            than are taken.
     """
     from av.error import FFmpegError
 
@@ -162,7 +169,6 @@ def open_video(path: Path, size: int) -> Video:
             stream = container.streams.video[0]
             if stream.codec_context is None:
                 raise CaptureError.of("kind", f"{path}: ")
-            _limit(stream)
             width, height = stream.codec_context.width, stream.codec_context.height
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1

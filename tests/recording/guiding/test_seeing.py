@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ico3d.capture import decoding
 from ico3d.capture.face.mediapipe_face import Face
 from ico3d.creating.looking import samples
 from ico3d.errors import MissingModelError
@@ -94,7 +95,7 @@ def test_a_part_is_reported_with_its_turns(eye, tmp_path):
 
 def test_pictures_that_would_fill_the_memory_are_not_decoded(eye, tmp_path, monkeypatch):
     file = part_file(tmp_path / "left.mp4")
-    monkeypatch.setattr(seeing, "MOST_PIXELS", 64 * 64 - 1)
+    monkeypatch.setattr(decoding, "MOST_PIXELS", 64 * 64 - 1)
     with pytest.raises(Refused, match="larger than is taken"):
         eye.report(file, "left")
 
