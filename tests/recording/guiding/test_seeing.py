@@ -96,8 +96,9 @@ def test_a_part_is_reported_with_its_turns(eye, tmp_path):
 def test_pictures_that_would_fill_the_memory_are_not_decoded(eye, tmp_path, monkeypatch):
     file = part_file(tmp_path / "left.mp4")
     monkeypatch.setattr(decoding, "MOST_PIXELS", 64 * 64 - 1)
-    with pytest.raises(Refused, match="larger than is taken"):
-        eye.report(file, "left")
+    for id in ("left", "upload", "consent"):
+        with pytest.raises(Refused, match="larger than is taken"):
+            eye.report(file, id)
 
 
 def test_a_turn_that_is_too_small_is_told(eye, tmp_path):

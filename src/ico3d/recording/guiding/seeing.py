@@ -91,6 +91,7 @@ class Eye:
         from av.error import FFmpegError
 
         try:
+            _check_size(file)
             if id == CONSENT:
                 return _of_consent(file)
             return self._brought(file) if id == UPLOAD else self._found(file, id)
@@ -107,7 +108,6 @@ class Eye:
             if refused:
                 raise unusable(refused)
             return report
-        _check_size(file)
         found = examine(file, SIDE, lambda _: None)
         if found.refused:
             raise unusable(found.refused)
@@ -115,7 +115,6 @@ class Eye:
         return {"seconds": seconds, "turn": None, "advice": [plain(one) for one in found.advice]}
 
     def _found(self, file: Path, id: str) -> dict[str, Any]:
-        _check_size(file)
         video = open_video(file, SIDE)
         heard = sound_advice(read_sound(file))
         seen: list[Advice] = []
