@@ -10,7 +10,7 @@ import numpy as np
 from ico3d.capture import decoding
 from ico3d.capture.capture import Sound
 from ico3d.capture.decoding import check_size
-from ico3d.capture.sound import check_claim
+from ico3d.capture.sound import check_claim, joined
 from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
@@ -196,7 +196,6 @@ def read_sound(path: Path, rate: int = SOUND_RATE) -> Sound | None:
         CaptureError: If the sound claims more than is accepted (`common.sound.fault`).
     """
     import av
-    import soxr
 
     with opened(path) as container:
         if not container.streams.audio or container.streams.audio[0].codec_context is None:
@@ -204,21 +203,23 @@ def read_sound(path: Path, rate: int = SOUND_RATE) -> Sound | None:
         stream, offset = container.streams.audio[0], _sound_offset(container)
         check_claim(path, Claim(stream.rate, frames=int(abs(offset) * stream.rate)))
         mono = av.AudioResampler("flt", "mono", stream.rate)
-        parts = [
+        pieces = (
             out.to_ndarray()[0]
-            for frame in _sound_frames(path, container, stream)
+            for frame in _sound_frames(path, container, stream, max(offset, 0.0))
             for out in mono.resample(frame)
-        ]
-        recorded = stream.rate
-    if not parts:
-        return None
-    samples = soxr.resample(np.concatenate(parts), recorded, rate, quality="VHQ")
-    return Sound(_shifted(samples, round(offset * rate)), rate)
+        )
+        later = round(offset * rate)
+        silence = max(later, 0)
+        samples = joined(pieces, stream.rate, rate, silence)
+    return Sound(samples[max(-later, 0) :], rate) if len(samples) > silence else None
 
 
-def _sound_frames(path: Path, container, stream) -> Iterator:
-    """The decoded pieces of a sound, for as long as it keeps to what is taken."""
-    samples = 0
+def _sound_frames(path: Path, container, stream, behind: float) -> Iterator:
+    """The decoded pieces of a sound, for as long as it keeps to what is taken.
+
+    It starts `behind` seconds behind the pictures, which count.
+    """
+    samples = int(behind * stream.rate)
     for frame in decoded_frames(container, stream):
         if frame is None:
             continue
@@ -228,19 +229,14 @@ def _sound_frames(path: Path, container, stream) -> Iterator:
 
 
 def _sound_offset(container) -> float:
-    """Seconds by which the sound starts after the first picture."""
+    """Seconds by which the sound starts after the first picture; 0 where there are no pictures."""
+    if not container.streams.video:
+        return 0.0
     starts = [
         float((stream.start_time or 0) * stream.time_base)
         for stream in (container.streams.audio[0], container.streams.video[0])
     ]
     return starts[0] - starts[1]
-
-
-def _shifted(samples: np.ndarray, later: int) -> np.ndarray:
-    """Samples moved `later` places to the right: silence put in front, or the front cut off."""
-    if later >= 0:
-        return np.concatenate([np.zeros(later, np.float32), samples]).astype(np.float32)
-    return samples[-later:].astype(np.float32)
 
 
 def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:

@@ -15,6 +15,7 @@ from ico3d.recording.guiding import seeing
 from ico3d.recording.guiding.seeing import Eye, short_of, turn_of
 from ico3d.recording.refusals import Refused
 from support.needs import needs
+from support.recordings.films import write_heard
 from support.studio_page.parts import part_file
 
 pytestmark = [needs("av"), needs("cv2"), pytest.mark.slow]
@@ -159,6 +160,9 @@ def test_consent_must_be_heard_and_may_be_without_pictures(eye, tmp_path):
     )
     with pytest.raises(Refused, match="nothing is heard"):
         eye.report(part_file(tmp_path / "silent.mp4", sound=False), "consent")
+    said = np.random.default_rng(0).integers(-9000, 9000, 16_000, np.int16)
+    heard = write_heard(tmp_path / "heard.mkv", said, 16_000, pictures=False)
+    assert eye.report(heard, "consent")["seconds"] == 1.0
 
 
 @pytest.mark.parametrize("id", ["upload", "text-1", "consent"])
