@@ -7,25 +7,41 @@ import av
 import numpy as np
 import pytest
 import soundfile
+import soxr
 
-from ico3d.capture.sound import RATE, read_sound_file
+from ico3d.capture.sound import BLOCK, RATE, read_sound_file
 from ico3d.capture.synthetic import SyntheticCapture
 from ico3d.capture.video import read_sound
 from ico3d.common.sound import RECORDING, Claim, fault
 from ico3d.errors import CaptureError
+from support.recordings.films import write_heard
 
 MB = 1 << 20
 
 
 def refused(read, match):
     """Asks that `read` refuses what it is given, without much memory."""
-    tracemalloc.start()
-    try:
+
+    def ask():
         with pytest.raises(CaptureError, match=match):
             read()
-        assert tracemalloc.get_traced_memory()[1] < 10 * MB
+
+    assert memory_of(ask) < 10 * MB
+
+
+def memory_of(read):
+    """Bytes that a reader takes at most."""
+    tracemalloc.start()
+    try:
+        read()
+        return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+
+
+def noise(count):
+    """(S,) int16."""
+    return np.random.default_rng(0).integers(-9000, 9000, count, np.int16)
 
 
 @pytest.mark.parametrize("rate", [1, 1000])
@@ -65,6 +81,38 @@ def test_a_video_whose_sound_claims_a_strange_rate(tmp_path):
         for packet in [*stream.encode(frame), *stream.encode(), *picture.encode()]:
             out.mux(packet)
     refused(lambda: read_sound(path), "claims 50 samples per second")
+
+
+def test_a_film_is_resampled_piece_by_piece_as_it_would_be_at_once(tmp_path):
+    samples = noise(100_000)
+    sound = read_sound(write_heard(tmp_path / "a.mkv", samples, 48_000))
+    whole = soxr.resample(samples / np.float32(1 << 15), 48_000, RATE, quality="VHQ")
+    np.testing.assert_allclose(sound.samples, whole, atol=1e-6)
+    assert sound.samples.dtype == np.float32
+
+
+def test_a_sound_file_is_resampled_block_by_block_as_it_would_be_at_once(tmp_path):
+    samples = noise(5 * BLOCK + 98).reshape(-1, 2)
+    soundfile.write(tmp_path / "a.flac", samples, 44_100)
+    sound = read_sound_file(tmp_path / "a.flac")
+    mean = (samples / np.float32(1 << 15)).mean(1)
+    np.testing.assert_allclose(
+        sound.samples, soxr.resample(mean, 44_100, RATE, quality="VHQ"), atol=1e-6
+    )
+
+
+def test_a_sound_that_unpacks_to_much_is_there_once_and_at_the_wanted_rate(tmp_path):
+    silence = np.zeros(30 * 96_000, np.int16)
+    film = write_heard(tmp_path / "a.mkv", silence, 96_000)
+    soundfile.write(tmp_path / "a.flac", silence, 96_000)
+    kept = 30 * RATE * 4
+    assert memory_of(lambda: read_sound(film)) < 2 * kept
+    assert memory_of(lambda: read_sound_file(tmp_path / "a.flac")) < 2 * kept
+
+
+def test_a_film_without_pictures_is_heard_from_its_start(tmp_path):
+    sound = read_sound(write_heard(tmp_path / "a.mkv", noise(16_000), 16_000, pictures=False))
+    assert len(sound.samples) == 16_000
 
 
 def test_a_synthetic_recording_is_judged_too(tmp_path):

@@ -6,7 +6,7 @@ import av
 import numpy as np
 import pytest
 
-from ico3d.capture import video
+from ico3d.capture import decoding
 from ico3d.capture.multiview.clip import Clip
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError
@@ -69,6 +69,22 @@ def test_a_list_of_other_files_is_no_film(tmp_path):
 
 def test_pictures_larger_than_cameras_make_are_not_decoded(tmp_path, monkeypatch):
     write_film(tmp_path / "a.mp4")
-    monkeypatch.setattr(video, "MOST_PIXELS", 64 * 48 - 1)
-    with pytest.raises(CaptureError, match="cannot be decoded as a video"):
-        open_video(tmp_path / "a.mp4", 48)
+    monkeypatch.setattr(decoding, "MOST_PIXELS", 64 * 48 - 1)
+    for read in (
+        lambda: open_video(tmp_path / "a.mp4", 48),
+        lambda: Clip(tmp_path / "a.mp4").count,
+    ):
+        with pytest.raises(CaptureError, match="64×48 pixels is larger than is taken"):
+            read()
+
+
+def test_pictures_with_a_side_that_ends_the_process_are_refused(tmp_path):
+    film = tmp_path / "a.mkv"
+    with av.open(str(film), "w") as container:
+        stream = container.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 40_000, 8, "gray"
+        frame = av.VideoFrame(40_000, 8, "gray")
+        container.mux([*stream.encode(frame), *stream.encode()])
+    for read in (lambda: open_video(film, 48), lambda: Clip(film).count, lambda: read_sound(film)):
+        with pytest.raises(CaptureError, match="40000×8 pixels is larger than is taken"):
+            read()

@@ -10,6 +10,10 @@ from PIL import Image, UnidentifiedImageError
 
 from ico3d.errors import CaptureError
 
+MOST_PIXELS = 8192 * 4320
+"""Largest size of a picture, of a video too: what cameras record at most."""
+MOST_SIDE = 16_384
+"""Longest side of a picture: beyond 32,766, OpenCV within MediaPipe ends the whole process."""
 DAMAGED = (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError)
 """What Pillow raises for files that it cannot read; SyntaxError stands for a broken PNG."""
 
@@ -52,6 +56,24 @@ def has_opacity(source: Path | bytes, what: str) -> bool:
     """
     with _opened(source, what) as picture:
         return _is_clear(picture)
+
+
+def check_size(what: str, width: int, height: int) -> None:
+    """Refuses a picture that is larger than is taken, before it is decoded or looked at.
+
+    Args:
+        what: Name of the picture, or of the video, in the error.
+        width: Its width in pixels.
+        height: Its height in pixels.
+
+    Raises:
+        CaptureError: If it has more than `MOST_PIXELS` or a side longer than `MOST_SIDE`.
+    """
+    if width * height > MOST_PIXELS or max(width, height) > MOST_SIDE:
+        raise CaptureError(
+            f"{what}: a picture of {width}×{height} pixels is larger than is taken, which is "
+            f"{MOST_PIXELS} pixels and {MOST_SIDE} on a side: scale it down."
+        )
 
 
 def unit(picture: np.ndarray) -> np.ndarray:

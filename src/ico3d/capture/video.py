@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.capture import decoding
 from ico3d.capture.capture import Sound
-from ico3d.capture.sound import check_claim
+from ico3d.capture.decoding import check_size
+from ico3d.capture.sound import check_claim, joined
 from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
 SOUND_RATE = 16_000
-MOST_PIXELS = 8192 * 4320
-"""Largest size of a video's pictures: what cameras record at most."""
 FORMATS = (
     "mov,mp4,matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,ivf,flv,asf,ogg,mxf,nut,gif,"
     "dv,rm,y4m,yuv4mpegpipe"
@@ -95,7 +95,6 @@ class Video:
         with opened(self.path) as container:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
-            _limit(stream)
             first = None
             for frame in decoded_frames(container, stream):
                 if frame is None:
@@ -126,19 +125,26 @@ def _is_near(wanted: float, taken: float, fps: float) -> bool:
 def opened(path: Path) -> Any:
     """A PyAV container of a file, which cannot make FFmpeg open another file or an address.
 
+    Its decoders refuse larger pictures than the file states, which would fill the memory.
+
     Raises:
+        CaptureError: If the file states larger pictures than are taken (`decoding.check_size`).
         FFmpegError: If it is no video, or is a play list.
         OSError: If it cannot be read.
     """
     import av
 
     bounds = {"format_whitelist": FORMATS, "protocol_whitelist": "file"}
-    return av.open(str(path), metadata_errors="replace", container_options=bounds)
-
-
-def _limit(stream: Any) -> None:
-    """Has the decoder refuse larger pictures than the file states, which would fill the memory."""
-    stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+    container = av.open(str(path), metadata_errors="replace", container_options=bounds)
+    try:
+        for stream in container.streams.video:
+            if stream.codec_context is not None:
+                check_size(str(path), stream.codec_context.width, stream.codec_context.height)
+                stream.codec_context.options = {"max_pixels": str(decoding.MOST_PIXELS)}
+    except CaptureError:
+        container.close()
+        raise
+    return container
 
 
 def open_video(path: Path, size: int) -> Video:
@@ -149,7 +155,8 @@ def open_video(path: Path, size: int) -> Video:
         size: Upper limit of the pictures' short side in pixels; larger videos are scaled down.
 
     Raises:
-        CaptureError: If the file is missing, is no video, or cannot be opened.
+        CaptureError: If the file is missing, is no video, cannot be opened, or has larger pictures
+            than are taken.
     """
     from av.error import FFmpegError
 
@@ -162,7 +169,6 @@ def open_video(path: Path, size: int) -> Video:
             stream = container.streams.video[0]
             if stream.codec_context is None:
                 raise CaptureError.of("kind", f"{path}: ")
-            _limit(stream)
             width, height = stream.codec_context.width, stream.codec_context.height
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1
@@ -190,7 +196,6 @@ def read_sound(path: Path, rate: int = SOUND_RATE) -> Sound | None:
         CaptureError: If the sound claims more than is accepted (`common.sound.fault`).
     """
     import av
-    import soxr
 
     with opened(path) as container:
         if not container.streams.audio or container.streams.audio[0].codec_context is None:
@@ -198,21 +203,23 @@ def read_sound(path: Path, rate: int = SOUND_RATE) -> Sound | None:
         stream, offset = container.streams.audio[0], _sound_offset(container)
         check_claim(path, Claim(stream.rate, frames=int(abs(offset) * stream.rate)))
         mono = av.AudioResampler("flt", "mono", stream.rate)
-        parts = [
+        pieces = (
             out.to_ndarray()[0]
-            for frame in _sound_frames(path, container, stream)
+            for frame in _sound_frames(path, container, stream, max(offset, 0.0))
             for out in mono.resample(frame)
-        ]
-        recorded = stream.rate
-    if not parts:
-        return None
-    samples = soxr.resample(np.concatenate(parts), recorded, rate, quality="VHQ")
-    return Sound(_shifted(samples, round(offset * rate)), rate)
+        )
+        later = round(offset * rate)
+        silence = max(later, 0)
+        samples = joined(pieces, stream.rate, rate, silence)
+    return Sound(samples[max(-later, 0) :], rate) if len(samples) > silence else None
 
 
-def _sound_frames(path: Path, container, stream) -> Iterator:
-    """The decoded pieces of a sound, for as long as it keeps to what is taken."""
-    samples = 0
+def _sound_frames(path: Path, container, stream, behind: float) -> Iterator:
+    """The decoded pieces of a sound, for as long as it keeps to what is taken.
+
+    It starts `behind` seconds behind the pictures, which count.
+    """
+    samples = int(behind * stream.rate)
     for frame in decoded_frames(container, stream):
         if frame is None:
             continue
@@ -222,19 +229,14 @@ def _sound_frames(path: Path, container, stream) -> Iterator:
 
 
 def _sound_offset(container) -> float:
-    """Seconds by which the sound starts after the first picture."""
+    """Seconds by which the sound starts after the first picture; 0 where there are no pictures."""
+    if not container.streams.video:
+        return 0.0
     starts = [
         float((stream.start_time or 0) * stream.time_base)
         for stream in (container.streams.audio[0], container.streams.video[0])
     ]
     return starts[0] - starts[1]
-
-
-def _shifted(samples: np.ndarray, later: int) -> np.ndarray:
-    """Samples moved `later` places to the right: silence put in front, or the front cut off."""
-    if later >= 0:
-        return np.concatenate([np.zeros(later, np.float32), samples]).astype(np.float32)
-    return samples[-later:].astype(np.float32)
 
 
 def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:

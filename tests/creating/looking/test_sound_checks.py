@@ -1,7 +1,9 @@
+import tracemalloc
+
 import numpy as np
 
 from ico3d.capture.capture import Sound
-from ico3d.creating.looking.sound_checks import sound_advice
+from ico3d.creating.looking.sound_checks import BLOCK, WINDOW, loudness, sound_advice
 
 RATE = 16_000
 
@@ -42,3 +44,25 @@ def test_a_quiet_voice_and_a_noisy_room_are_told():
     assert [text for _, text, _ in _said(_speech(0.01, 1e-5))] == ["the voice is quiet"]
     (noisy,) = _said(_speech(0.2, 0.1))
     assert noisy[1].startswith("noise is nearly as loud")
+
+
+def test_clipping_is_found_in_every_block_of_a_long_sound():
+    samples = np.tile(_speech(), 8)
+    at = int((BLOCK + 0.5) * WINDOW * RATE)
+    samples[at : at + 3] = 1.0
+    ((_, text, spans),) = _said(samples)
+    assert text == "the sound is clipped" and abs(spans[0][0] - at / RATE) < WINDOW
+
+
+def test_a_long_sound_is_not_copied():
+    sound = Sound(np.tile(_speech(), 12), RATE)
+    tracemalloc.start()
+    try:
+        assert list(sound_advice(sound)) == []
+        assert tracemalloc.get_traced_memory()[1] < sound.samples.nbytes
+    finally:
+        tracemalloc.stop()
+
+
+def test_loudness_is_in_decibels_of_full_scale():
+    np.testing.assert_allclose(loudness(np.full((3, 1600), 0.1, np.float32)), -20, atol=1e-5)

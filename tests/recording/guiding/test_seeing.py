@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ico3d.capture import decoding
 from ico3d.capture.face.mediapipe_face import Face
 from ico3d.creating.looking import samples
 from ico3d.errors import MissingModelError
@@ -14,6 +15,7 @@ from ico3d.recording.guiding import seeing
 from ico3d.recording.guiding.seeing import Eye, short_of, turn_of
 from ico3d.recording.refusals import Refused
 from support.needs import needs
+from support.recordings.films import write_heard
 from support.studio_page.parts import part_file
 
 pytestmark = [needs("av"), needs("cv2"), pytest.mark.slow]
@@ -94,9 +96,10 @@ def test_a_part_is_reported_with_its_turns(eye, tmp_path):
 
 def test_pictures_that_would_fill_the_memory_are_not_decoded(eye, tmp_path, monkeypatch):
     file = part_file(tmp_path / "left.mp4")
-    monkeypatch.setattr(seeing, "MOST_PIXELS", 64 * 64 - 1)
-    with pytest.raises(Refused, match="larger than is taken"):
-        eye.report(file, "left")
+    monkeypatch.setattr(decoding, "MOST_PIXELS", 64 * 64 - 1)
+    for id in ("left", "upload", "consent"):
+        with pytest.raises(Refused, match="larger than is taken"):
+            eye.report(file, id)
 
 
 def test_a_turn_that_is_too_small_is_told(eye, tmp_path):
@@ -157,6 +160,9 @@ def test_consent_must_be_heard_and_may_be_without_pictures(eye, tmp_path):
     )
     with pytest.raises(Refused, match="nothing is heard"):
         eye.report(part_file(tmp_path / "silent.mp4", sound=False), "consent")
+    said = np.random.default_rng(0).integers(-9000, 9000, 16_000, np.int16)
+    heard = write_heard(tmp_path / "heard.mkv", said, 16_000, pictures=False)
+    assert eye.report(heard, "consent")["seconds"] == 1.0
 
 
 @pytest.mark.parametrize("id", ["upload", "text-1", "consent"])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.capture.decoding import check_size
 from ico3d.common.native_messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
@@ -94,15 +95,28 @@ class FaceReader:
         return found[0] if found else None
 
     def faces(self, image: np.ndarray) -> list[Face]:
-        """As many faces of a picture, uint8 RGB (H, W, 3), as are looked for."""
-        packed = self._mediapipe.Image(
-            image_format=self._mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image)
-        )
-        found = self._landmarker.detect(packed)
+        """As many faces of a picture, uint8 RGB (H, W, 3), as are looked for.
+
+        Raises:
+            CaptureError: If the picture is larger than is taken.
+        """
+        found = self._landmarker.detect(packed(self._mediapipe, image))
         if found.face_blendshapes:
             self.names = tuple(shape.category_name for shape in found.face_blendshapes[0])
         parts = (found.face_landmarks, found.face_blendshapes, found.facial_transformation_matrixes)
         return [_face(image, *one) for one in zip(*parts, strict=True)]
+
+
+def packed(mediapipe: Any, picture: np.ndarray) -> Any:
+    """A picture, uint8 RGB (H, W, 3), as MediaPipe takes it.
+
+    Raises:
+        CaptureError: If it is larger than is taken: MediaPipe would end the process.
+    """
+    height, width = picture.shape[:2]
+    check_size("what is looked at", width, height)
+    form = mediapipe.ImageFormat.SRGB
+    return mediapipe.Image(image_format=form, data=np.ascontiguousarray(picture))
 
 
 def _face(image: np.ndarray, points: Any, shapes: Any, pose: Any) -> Face:

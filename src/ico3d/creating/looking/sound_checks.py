@@ -9,6 +9,8 @@ from ico3d.creating.looking.advice import Advice, spans_of
 
 WINDOW = 0.1
 """Seconds of a piece of sound."""
+BLOCK = 600
+"""Number of pieces that are looked at together; a whole recording would be there several times."""
 CLIPPED, IN_A_ROW = 0.985, 3
 """Size of a sample, and number of such samples in a row, from which on a sound is cut off."""
 SILENT, QUIET = -55.0, -38.0
@@ -44,11 +46,19 @@ def sound_advice(sound: Sound | None) -> Iterator[Advice]:
 
 def loudness(pieces: np.ndarray) -> np.ndarray:
     """(...) decibels of full scale of pieces of sound (..., n)."""
-    return 20 * np.log10(np.sqrt((pieces.astype(np.float64) ** 2).mean(-1)) + 1e-9)
+    # Sums in double precision without a copy of all samples in it.
+    power = np.einsum("...n,...n->...", pieces, pieces, dtype=np.float64) / pieces.shape[-1]
+    return 20 * np.log10(np.sqrt(power) + 1e-9)
 
 
 def clips(pieces: np.ndarray) -> np.ndarray:
     """(P,) whether a piece of (P, n) has samples at the limit in a row."""
+    starts = range(0, max(len(pieces), 1), BLOCK)
+    return np.concatenate([_clips(pieces[start : start + BLOCK]) for start in starts])
+
+
+def _clips(pieces: np.ndarray) -> np.ndarray:
+    """`clips` of a few pieces."""
     at_limit = np.abs(pieces) >= CLIPPED  # (P, n)
     rows = at_limit.shape[1] - IN_A_ROW + 1
     in_a_row = np.stack([at_limit[:, i : i + rows] for i in range(IN_A_ROW)])  # (3, P, rows)

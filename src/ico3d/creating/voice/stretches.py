@@ -69,7 +69,7 @@ def is_speech(sound: Sound) -> np.ndarray:
     """(F,) whether each 32 ms of a recording are speech, as Silero hears it."""
     samples = soxr.resample(sound.samples, sound.rate, MICROPHONE_RATE)
     frames = samples[: len(samples) // FRAME * FRAME].reshape(-1, FRAME)  # (F, 512)
-    pcm = (frames.clip(-1, 1) * 32767).astype(np.int16)
+    pcm = ((frame.clip(-1, 1) * 32767).astype(np.int16) for frame in frames)
     silero = EagerSilero(pause=0.2)
     silero.set_sample_rate(MICROPHONE_RATE)
     confidence = [np.ravel(silero.voice_confidence(frame.tobytes())) for frame in pcm]  # (1,) each

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from ico3d.capture.face.mediapipe_face import FaceReader
-from ico3d.capture.video import MOST_PIXELS, open_video, opened, read_sound
+from ico3d.capture.video import open_video, opened, read_sound
 from ico3d.common.typed import plain
 from ico3d.common.weights import model_file
 from ico3d.creating.looking.advice import Advice
@@ -91,6 +91,7 @@ class Eye:
         from av.error import FFmpegError
 
         try:
+            _check_size(file)
             if id == CONSENT:
                 return _of_consent(file)
             return self._brought(file) if id == UPLOAD else self._found(file, id)
@@ -107,7 +108,6 @@ class Eye:
             if refused:
                 raise unusable(refused)
             return report
-        _check_size(file)
         found = examine(file, SIDE, lambda _: None)
         if found.refused:
             raise unusable(found.refused)
@@ -115,7 +115,6 @@ class Eye:
         return {"seconds": seconds, "turn": None, "advice": [plain(one) for one in found.advice]}
 
     def _found(self, file: Path, id: str) -> dict[str, Any]:
-        _check_size(file)
         video = open_video(file, SIDE)
         heard = sound_advice(read_sound(file))
         seen: list[Advice] = []
@@ -155,12 +154,13 @@ def _check_size(file: Path) -> None:
     """Refuses a video whose pictures would fill the memory, before one is decoded.
 
     Raises:
-        Refused: If its file states more pixels than `MOST_PIXELS`.
+        Refused: If its file states larger ones than are taken.
     """
-    with opened(file) as container:
-        sizes = [stream.width * stream.height for stream in container.streams.video]
-    if max(sizes, default=0) > MOST_PIXELS:
-        raise Refused("large", "the pictures of this video are larger than is taken.", 413)
+    try:
+        opened(file).close()
+    except CaptureError as error:
+        text = "the pictures of this video are larger than is taken."
+        raise Refused("large", text, 413) from error
 
 
 def short_of(id: str, turn: list[float] | None) -> list[Advice]:

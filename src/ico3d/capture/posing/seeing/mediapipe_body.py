@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.capture.face.mediapipe_face import packed
 from ico3d.common.native_messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
@@ -83,7 +84,7 @@ class BodyReader:
 
     def body(self, picture: np.ndarray) -> Body | None:
         """The person in a picture, uint8 RGB (H, W, 3); None where there is none."""
-        found = self._bodies.detect(_packed(self._mediapipe, picture))
+        found = self._bodies.detect(packed(self._mediapipe, picture))
         if not found.pose_landmarks:
             return None
         seen, space = found.pose_landmarks[0], found.pose_world_landmarks[0]
@@ -135,7 +136,7 @@ class HandReader:
     def hands(self, picture: np.ndarray) -> list[Hand]:
         """As many hands of a picture, uint8 RGB (H, W, 3), as are looked for."""
         with nullcontext() if self._used else held_back():  # what the first one says of pictures
-            found = self._hands.detect(_packed(self._mediapipe, picture))
+            found = self._hands.detect(packed(self._mediapipe, picture))
         self._used = True
         return [
             Hand(_pixels(points, picture), sides[0].category_name == "Left", float(sides[0].score))
@@ -151,12 +152,6 @@ def _imported(model: Path) -> tuple[Any, Any, Any]:
     except ImportError as error:
         raise MissingExtraError("mediapipe", "face", PURPOSE) from error
     return mediapipe, vision, BaseOptions(model_asset_path=str(model))
-
-
-def _packed(mediapipe: Any, picture: np.ndarray) -> Any:
-    """A picture as MediaPipe takes it."""
-    form = mediapipe.ImageFormat.SRGB
-    return mediapipe.Image(image_format=form, data=np.ascontiguousarray(picture))
 
 
 def _opened(model: Path, load: Callable[[], Any]) -> Any:
