@@ -345,5 +345,6 @@ def open_room(
         voices: Whether people are asked if their voice may be cloned, too.
     """
     people = People(folder)
+    people.clear()
     servers = Makers(people, bodies), Talks(host, tls)
     return Room(people, Eye(), bodies, *servers, voices, defaultdict(asyncio.Lock))

@@ -1,12 +1,14 @@
 """`ico3d forget`: a project of two people, of which one goes."""
 
 import json
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.format import write_bundle
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
@@ -173,13 +175,30 @@ def test_what_makes_no_sense_is_one_sentence(project, capsys, words, sentence):
 
 
 def test_what_cannot_be_removed_is_named(project, monkeypatch, capsys):
-    def fail(path):
-        raise PermissionError(13, "Permission denied")
+    unlink = os.unlink
 
-    monkeypatch.setattr("shutil.rmtree", fail)
+    def fail(path, **more):
+        if str(path).endswith("tracking.safetensors"):
+            raise PermissionError(13, "Permission denied")
+        unlink(path, **more)
+
+    monkeypatch.setattr("os.unlink", fail)
     assert main(["forget", "captures/face", "ada.ico3d", "--yes"]) == 1
+    assert [file.name for file in (project / "captures/face").iterdir()] == ["tracking.safetensors"]
     assert f"{project}/captures/face (Permission denied)" in capsys.readouterr().err
     assert "ada.ico3d" not in there(project)
+
+
+def test_what_vanishes_meanwhile_does_not_save_the_rest(project, monkeypatch):
+    unlink = os.unlink
+
+    def vanish(path, **more):
+        unlink(path, **more)
+        raise FileNotFoundError(2, "No such file or directory")
+
+    monkeypatch.setattr("os.unlink", vanish)
+    remove([project / "captures/face"])
+    assert not (project / "captures/face").exists()
 
 
 def test_what_the_studio_page_recorded_is_found_by_name(project):

@@ -6,6 +6,7 @@ import pytest
 
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.common.people.stated import is_stated
+from ico3d.errors import SettingsError
 from ico3d.recording.keeping import people as room
 from ico3d.recording.keeping.people import People
 from ico3d.recording.refusals import Refused
@@ -96,6 +97,33 @@ def test_delete_leaves_nothing_and_nobody_else_loses_anything(tmp_path):
     assert list(tmp_path.iterdir()) == [ada.folder]
     with pytest.raises(Refused, match="nothing is recorded of Ida"):
         People(tmp_path).person("Ida")
+
+
+def test_a_removal_that_was_killed_is_ended_at_the_next_start(tmp_path, monkeypatch):
+    ida = begun(tmp_path)
+    kept(ida, "consent", WEBM)
+    monkeypatch.setattr(room, "remove", lambda paths: None)
+    People(tmp_path).delete("Ida")
+    monkeypatch.undo()
+    (left,) = tmp_path.iterdir()
+    assert left.name.startswith(".") and (left / "parts" / "consent.webm").is_file()
+    others = begun(tmp_path, "Ida"), (tmp_path / ".git"), (tmp_path / ".Ida.gone")
+    for other in others[1:]:
+        other.mkdir()
+    People(tmp_path).clear()
+    assert {path.name for path in tmp_path.iterdir()} == {"Ida", ".git", ".Ida.gone"}
+
+
+def test_what_cannot_be_removed_is_named(tmp_path, monkeypatch):
+    begun(tmp_path)
+
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.rename", refuse)
+    with pytest.raises(SettingsError, match=r"Ida cannot be removed \(Permission denied\)"):
+        People(tmp_path).delete("Ida")
+    assert People(tmp_path).names() == ["Ida"]
 
 
 def test_a_link_to_elsewhere_is_nobody(tmp_path):

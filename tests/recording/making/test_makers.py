@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -88,6 +89,33 @@ def test_what_the_system_kills_is_said_and_goes_on(people, makers):
     assert (found.state, found.code, found.error) == ("failed", "killed", FAILURES["killed"])
     makers.begin(ada, "good")
     assert makers.progress(ada).code == ""
+
+
+def test_who_asks_how_far_it_is_brings_nothing_back_that_is_deleted_meanwhile(
+    people, makers, monkeypatch
+):
+    ada, read = people.person("Ada"), room.read_progress
+    folder = Places(ada.folder).folder
+    folder.mkdir()
+    write_progress(folder, Progress("running", "good"))  # and nobody is at work
+
+    def delete():
+        makers.stop(ada)
+        people.delete("Ada")
+
+    other = threading.Thread(target=delete)
+
+    def look(folder):
+        found = read(folder)
+        if other.ident is None:
+            other.start()
+            other.join(0.1)  # as long as it may
+        return found
+
+    monkeypatch.setattr(room, "read_progress", look)
+    assert makers.progress(ada).state == "failed"
+    other.join()
+    assert [path.name for path in people.folder.iterdir()] == ["Ida"]
 
 
 def test_a_server_that_comes_back_goes_on(people, makers):

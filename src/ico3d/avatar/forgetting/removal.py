@@ -36,14 +36,35 @@ def remove(paths: Sequence[Path]) -> list[str]:
                 path.unlink()
             elif path.is_dir():
                 targets += _links_in(path)
-                shutil.rmtree(path)
+                _remove_folder(path)
             else:
-                path.unlink()
+                path.unlink(missing_ok=True)
         except OSError as error:
             left.append(f"{path} ({error.strerror})")
     if left:
         raise SettingsError(f"all is gone but {', '.join(left)}: it cannot be removed.")
     return targets
+
+
+def _remove_folder(folder: Path) -> None:
+    """Removes a folder; what vanishes meanwhile, or cannot be removed, does not save the rest.
+
+    Raises:
+        OSError: The first one, if something is left.
+    """
+    faults: list[OSError] = []
+
+    def go_on(function: object, path: str, about: tuple) -> None:
+        del function, path
+        if not isinstance(about[1], FileNotFoundError):
+            faults.append(about[1])
+
+    try:
+        shutil.rmtree(folder, onerror=go_on)
+    except RecursionError as error:
+        raise OSError(0, "its folders are nested too deep") from error
+    if faults:
+        raise faults[0]
 
 
 def _links_in(folder: Path) -> list[str]:

@@ -1,7 +1,9 @@
 """The folder of all recordings: whose there are, and how one begins."""
 
 import json
+import logging
 import re
+import secrets
 import shutil
 import unicodedata
 from datetime import date
@@ -11,6 +13,7 @@ from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
 from ico3d.common.files import write_atomic
 from ico3d.creating.settings import OWN_USE
+from ico3d.errors import SettingsError
 from ico3d.recording.keeping.person import (
     CONSENT_FILE,
     MAKING,
@@ -22,8 +25,12 @@ from ico3d.recording.keeping.person import (
 from ico3d.recording.keeping.plan import scripts
 from ico3d.recording.refusals import Refused, bad_name, full_disk
 
+log = logging.getLogger(__name__)
+
 NAME = re.compile(r"[^\W\d_][\w -]{0,39}")
 """What may be the name of a person, and so of a folder and a file."""
+GONE = re.compile(r"\..+\.[0-9a-f]{16}\.gone")
+"""Names of folders that are being removed."""
 MOST = 100
 """Number of people whose recordings one folder holds."""
 SPARE = 200_000_000
@@ -111,7 +118,21 @@ class People:
             Refused: If there is nobody of this name.
             SettingsError: If something cannot be removed; the sentence names it.
         """
-        remove([self.person(name).folder])
+        folder = self.person(name).folder
+        gone = self.folder / f".{folder.name}.{secrets.token_hex(8)}.gone"
+        try:
+            folder.rename(gone)  # from now on nobody finds it who would write there
+        except OSError as error:
+            raise SettingsError(f"{folder} cannot be removed ({error.strerror}).") from error
+        remove([gone])
+
+    def clear(self) -> None:
+        """Removes what is left of removals that were killed; what cannot be removed is logged."""
+        left = [path for path in self.folder.iterdir() if GONE.fullmatch(path.name)]
+        try:
+            remove(left)
+        except SettingsError as error:
+            log.warning("%s", error)
 
 
 def checked_name(name: str) -> str:

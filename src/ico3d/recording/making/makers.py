@@ -125,24 +125,29 @@ class Makers:
     def progress(self, person: Person) -> Progress | None:
         """How far somebody's avatar is; None where none was begun."""
         folder = Places(person.folder).folder
-        with self._lock:
+        with self._lock:  # until it is written: who stops a making may go on to delete it
             process = self._running.get(person.name)
             status = None if process is None else process.poll()
-        found = read_progress(folder)
-        if found is None or found.state != "running" or (process is not None and status is None):
-            return found
-        code = ENDS.get(status or 0, "ended")
-        failed = replace(found, state="failed", left=None, error=FAILURES[code], code=code)
-        with contextlib.suppress(StorageError):  # that may be why
-            write_progress(folder, failed)
-        return failed
+            is_at_work = process is not None and status is None
+            found = read_progress(folder)
+            if found is None or found.state != "running" or is_at_work:
+                return found
+            code = ENDS.get(status or 0, "ended")
+            failed = replace(found, state="failed", left=None, error=FAILURES[code], code=code)
+            with contextlib.suppress(StorageError):  # that may be why
+                write_progress(folder, failed)
+            return failed
 
     def stop(self, person: Person) -> None:
         """Stops the making of an avatar, if one is being made; it can go on later."""
         with self._lock:
-            process = self._running.pop(person.name, None)
-            if process is not None:
-                stop(process)
+            self._stop(person)
+
+    def _stop(self, person: Person) -> None:
+        """Stops the making of an avatar for somebody who holds the lock."""
+        process = self._running.pop(person.name, None)
+        if process is not None:
+            stop(process)
         folder = Places(person.folder).folder
         found = read_progress(folder)
         if found is not None and found.state == "running":
@@ -150,8 +155,9 @@ class Makers:
 
     def discard(self, person: Person) -> None:
         """Removes what was made so far; recordings and a finished avatar stay."""
-        self.stop(person)
-        shutil.rmtree(Places(person.folder).folder, ignore_errors=True)
+        with self._lock:
+            self._stop(person)
+            shutil.rmtree(Places(person.folder).folder, ignore_errors=True)
 
     def changed(self, person: Person, progress: Progress) -> list[str]:
         """What is another since a making began: `parts`, `on` (the body), both or nothing."""
