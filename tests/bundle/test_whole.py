@@ -3,6 +3,7 @@
 import gzip
 import json
 import struct
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -30,9 +31,12 @@ def ply(count: int = 2, rows: bytes | None = None, more: str = "", kind: str = "
     return header.encode() + b"end_header\n" + (b"\0" * 16 * count if rows is None else rows)
 
 
-def spz(version: int = 3, count: int = 2, degree: int = 0, magic: bytes = b"NGSP") -> bytes:
+def spz(
+    version: int = 3, count: int = 2, degree: int = 0, magic: bytes = b"NGSP", more: bytes = b""
+) -> bytes:
     header = struct.pack("<4sIIBBBB", magic, version, count, degree, 12, 0, 0)
-    return gzip.compress(header + b"\0" * 20 * min(count, 10), mtime=0)
+    row = (19 if version == 2 else 20) + 3 * ((degree + 1) ** 2 - 1)
+    return gzip.compress(header + b"\0" * row * min(count, 10) + more, mtime=0)
 
 
 def test_a_whole_person_reads_back(tmp_path):
@@ -119,15 +123,19 @@ def test_backgrounds_that_are_read(name, data):
 @pytest.mark.parametrize(
     "name, data, message",
     [
-        ("background.spz", b"", "is not an SPZ file"),
-        ("background.spz", b"\x1f\x8b" + b"\0" * 40, "is not an SPZ file"),
-        ("background.spz", gzip.compress(b"NGSP", mtime=0), "is not an SPZ file"),
-        ("background.spz", spz(magic=b"EVIL"), "is not an SPZ file"),
-        ("background.spz", spz(9), "unknown kind"),
-        ("background.spz", spz(degree=4), "unknown kind"),
+        ("background.spz", b"", "does not begin a header"),
+        ("background.spz", b"\x1f\x8b" + b"\0" * 40, "gzip stream is damaged"),
+        ("background.spz", gzip.compress(b"NGSP", mtime=0), "does not begin a header"),
+        ("background.spz", spz(magic=b"EVIL"), "does not begin a header"),
+        ("background.spz", spz(9), "SPZ version 9"),
+        ("background.spz", spz(4), "SPZ version 4 at byte 4 of a gzip stream"),
+        ("background.spz", spz(degree=4), "SH degree 4"),
         ("background.spz", spz(count=0), "must hold 1 to"),
         ("background.spz", spz(count=1_000_001), "must hold 1 to"),
-        ("background.spz", spz(count=900_000), "cannot hold the 900000"),
+        ("background.spz", spz(count=900_000), "promises 900000 Gaussians"),
+        ("background.spz", spz()[:-9], "cut off"),
+        ("background.spz", spz(count=11), "11 Gaussians need 236 bytes unpacked"),
+        ("background.spz", spz(more=b"\0"), "data goes on after the last Gaussian"),
         ("background.ply", b"", "is not a PLY file"),
         ("background.ply", b"\nend_header\n", "is not a PLY file"),
         ("background.ply", ply().replace(b"binary_little_endian", b"ascii"), "must be of the"),
@@ -145,6 +153,16 @@ def test_hostile_backgrounds_are_refused_in_one_sentence(name, data, message):
     with pytest.raises(BundleError, match=message) as caught:
         check_background(data, name)
     assert str(caught.value).startswith(name) and "\n" not in str(caught.value)
+
+
+def test_a_background_that_unpacks_to_far_more_is_refused_before_its_end():
+    """What its header says of two Gaussians is true; what follows would be unpacked by the page."""
+    data = spz(more=b"\0" * (4 << 20))
+    tracemalloc.start()
+    with pytest.raises(BundleError, match="data goes on after the last Gaussian"):
+        check_background(data, "background.spz")
+    assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    tracemalloc.stop()
 
 
 def test_a_background_that_is_too_large_is_refused(monkeypatch):

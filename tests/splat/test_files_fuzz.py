@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ico3d.common.spz.container import FREE_BYTES
 from ico3d.errors import GaussianFileError
 from ico3d.splat.files.formats import read_gaussians, write_gaussians
-from ico3d.splat.files.spz_container import FREE_BYTES
 from support.splats.gaussian_files import as_gsply, gsply, ply_bytes, random_gaussians, splat_bytes
 
 pytestmark = pytest.mark.slow

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
+from ico3d.common.spz.container import FREE_BYTES, MAX_RATIO
 from ico3d.errors import GaussianFileError
 from ico3d.splat import harmonics, quaternions
 from ico3d.splat.files.formats import read_file, read_gaussians, write_gaussians
-from ico3d.splat.files.spz_container import FREE_BYTES, MAX_RATIO
 from support.splats.gaussian_files import as_gsply, gsply, random_gaussians, same
 
 FLIP = np.array([1, -1, -1], np.float32)

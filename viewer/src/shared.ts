@@ -12,6 +12,9 @@ export const OLDEST_BUNDLE = 1;
 /** Of a head or a window of a body; bundle/limits.py. */
 export const MAX_GAUSSIANS = 1000000;
 
+/** What SPZ files may unpack to, and their highest degree; common/spz/container.py. */
+export const SPZ = {"ratio": 8, "free": 262144, "degree": 3} as const;
+
 /** Residual shapes of a body on a skeleton. */
 export const MAX_SHAPES = 8;
 

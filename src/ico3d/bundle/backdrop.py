@@ -1,25 +1,18 @@
 """Checks the Gaussians of a background (`background.spz` or `.ply`) in a bundle.
 
 Only browsers decode this file. Here the header must not claim more Gaussians than a bundle may
-hold, and the file must be as large as the header claims; SPZ, which is compressed, must not be
-impossibly small.
+hold, and the file must be as large as the header claims; SPZ, which is compressed, is unpacked to
+its end for that, a piece at a time.
 """
 
 import re
-import struct
-import zlib
 
 from ico3d.bundle import limits
-from ico3d.errors import BundleError
+from ico3d.common.spz.container import check, read_header
+from ico3d.errors import BundleError, GaussianFileError
 
 BACKGROUNDS = ("background.spz", "background.ply")
 """Possible names of the background; a bundle holds at most one of them."""
-_SPZ_HEADER = struct.Struct("<4sIIBBBB")
-_SPZ_VERSIONS, _MAX_DEGREE = (2, 3, 4), 3
-_LEAST_SPZ_BYTES = 19
-"""Unpacked bytes of a Gaussian without harmonics."""
-_MAX_RATIO, _FREE_BYTES = 8, 1 << 18
-"""As in `ico3d.splat.files`: largest ratio of unpacked to packed bytes; bytes always allowed."""
 _MAX_PLY_HEADER = 1 << 16
 _WIDTHS = {
     **dict.fromkeys(("char", "int8", "uchar", "uint8"), 1),
@@ -38,31 +31,16 @@ def check_background(data: bytes, name: str) -> None:
     """
     if len(data) > limits.MAX_BACKGROUND_BYTES:
         raise BundleError(f"{name}: is larger than {limits.MAX_BACKGROUND_BYTES} bytes.")
-    check = _check_spz if name.endswith(".spz") else _check_ply
-    check(data, name)
+    of_kind = _check_spz if name.endswith(".spz") else _check_ply
+    of_kind(data, name)
 
 
 def _check_spz(data: bytes, name: str) -> None:
-    header = _spz_header(data, name)
-    if len(header) < _SPZ_HEADER.size or header[:4] != b"NGSP":
-        raise BundleError(f"{name}: is not an SPZ file.")
-    _, version, count, degree, *_ = _SPZ_HEADER.unpack(header)
-    if version not in _SPZ_VERSIONS or degree > _MAX_DEGREE:
-        raise BundleError(f"{name}: is an SPZ file of an unknown kind.")
-    _check_count(count, name)
-    if count * _LEAST_SPZ_BYTES > _MAX_RATIO * len(data) + _FREE_BYTES:
-        raise BundleError(f"{name}: cannot hold the {count} Gaussians that it promises.")
-
-
-def _spz_header(data: bytes, name: str) -> bytes:
-    """The first bytes: as they are in version 4, of a gzip stream in earlier ones."""
-    if data[:4] == b"NGSP":
-        return data[: _SPZ_HEADER.size]
     try:
-        unpacker = zlib.decompressobj(zlib.MAX_WBITS | 16)
-        return unpacker.decompress(data, _SPZ_HEADER.size)
-    except zlib.error as error:
-        raise BundleError(f"{name}: is not an SPZ file.") from error
+        _check_count(read_header(data).count, name)
+        check(data)
+    except GaussianFileError as error:
+        raise BundleError(f"{name}: {error}.") from error
 
 
 def _check_ply(data: bytes, name: str) -> None:

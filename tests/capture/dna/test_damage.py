@@ -1,7 +1,9 @@
 """Damaged and incomplete recordings: known ones are read, others are one sentence."""
 
 import logging
+import os
 import shutil
+import tracemalloc
 
 import h5py
 import numpy as np
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
+from ico3d.capture.smc.file import SmcFile
 from ico3d.cli import main as run
 from ico3d.errors import CaptureError, MissingExtraError
 from support.recordings import dna_files
@@ -179,6 +182,44 @@ def test_links_never_lead_into_other_files(main, tmp_path):
         file["Camera_5mp/0/color/1"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "x")
     capture = open_capture(main)
     fails(lambda: capture.image(0, 1), "Camera_5mp/0/color/1", "damaged")
+
+
+def test_tables_of_numbers_that_were_never_written_are_refused_unread(main):
+    """They take no bytes of the file, and eight in memory for each number."""
+    rows = (1 << 28) // 165
+    with h5py.File(annotations_of(main), "a") as file:
+        del file["SMPLx/fullpose"]
+        file.create_dataset("SMPLx/fullpose", (rows, 55, 3), "u1", chunks=(4096, 55, 3))
+    tracemalloc.start()
+    capture = open_capture(main)
+    fails(lambda: capture.smplx(0), f"SMPLx/fullpose has shape ({rows}, 55, 3)", "at most 100000")
+    assert tracemalloc.get_traced_memory()[1] < 4 << 20
+    tracemalloc.stop()
+
+
+def test_numbers_are_limited_in_memory_and_in_what_is_unpacked_for_one(main):
+    file = SmcFile(main)
+    with h5py.File(main, "a") as written:
+        written.create_dataset("wide", (9000, 5, 1000), "u1", chunks=(99, 5, 1000))
+        written.create_dataset("deep", (4, 4), "u1", maxshape=(None, 4), chunks=(1 << 27, 4))
+    fails(lambda: file.numbers("wide", None), "wide", "damaged")
+    fails(lambda: file.numbers("deep", (None, 4)), "deep", "damaged")
+    fails(lambda: file.head("deep", 4), "deep", "damaged")
+
+
+def test_a_picture_in_another_file_is_damaged_and_the_other_file_never_opened(main, tmp_path):
+    os.mkfifo(tmp_path / "pipe")  # whoever opens it waits
+    with h5py.File(main, "a") as file:
+        del file["Camera_5mp/0/color/1"]
+        outside = [(str(tmp_path / "pipe"), 0, 100)]
+        file.create_dataset("Camera_5mp/0/color/1", (100,), "u1", external=outside)
+    fails(lambda: open_capture(main).inspect(), "Camera_5mp/0/color/1", "damaged")
+
+
+def test_names_of_thousands_of_digits_are_no_cameras(main):
+    with h5py.File(main, "a") as file:
+        file["Camera_5mp"].create_group("9" * 5000)
+    assert len(open_capture(main).cameras) == 4
 
 
 def test_a_missing_package_names_its_extra(main, monkeypatch):

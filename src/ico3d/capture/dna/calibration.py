@@ -36,7 +36,7 @@ def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], lis
     devices, lost = [], []
     for group in GROUPS:
         size = None
-        for number in sorted(int(key) for key in main.keys(group) if key.isdecimal()):
+        for number in main.numbered(group):
             if not annotations.keys(f"Camera_Parameter/{number:02d}"):
                 lost.append(f"{number:02d}")
                 continue

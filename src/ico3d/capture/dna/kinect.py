@@ -40,8 +40,7 @@ class Kinect:
             CaptureError: If the file is damaged.
         """
         self._file, self._upright = file, upright
-        found = [int(key) for key in file.keys("Kinect") if key.isdecimal()]
-        self.cameras: tuple[int, ...] = tuple(sorted(found))
+        self.cameras: tuple[int, ...] = tuple(file.numbered("Kinect"))
 
     def calibration(self, camera: int) -> KinectCalibration:
         """Lens and pose of a depth camera.

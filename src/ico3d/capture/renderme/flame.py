@@ -76,7 +76,7 @@ class FlameFits:
             CaptureError: If the file is damaged.
         """
         self._file, self._upright = file, upright
-        found = sorted(int(key) for key in file.keys("FLAME") if key.isdecimal())
+        found = file.numbered("FLAME")
         self.frames: tuple[int, ...] = tuple(frame for frame in found if frame < num_frames)
 
     def at(self, frame: int) -> FlameFit | None:

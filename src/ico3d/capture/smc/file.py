@@ -1,6 +1,8 @@
 """Reads SMC files, a kind of HDF5 file, one piece at a time."""
 
+import math
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,9 +15,15 @@ from ico3d.errors import CaptureError
 
 PURPOSE = "reading SMC files"
 LARGEST = 256 * 2**20
-"""Largest size of one piece in bytes; a damaged header can claim any number."""
+"""Largest size of one piece in bytes, in the file's own numbers and in those that are returned.
+
+A damaged header can claim any number, and what was never written takes no bytes of the file.
+"""
+MOST_ROWS = 100_000
+"""Largest number of frames, and of rows of a table where any number is allowed."""
 MOST_VALUES = 16
 """Largest number of values in an attribute."""
+_NUMBER = re.compile("[0-9]{1,9}")
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What h5py raises for damaged files."""
 
@@ -46,6 +54,10 @@ class SmcFile:
             group = self._find(inside)
             # Names that are no UTF-8 come as bytes; ours are all digits.
             return [k for k in group if isinstance(k, str)] if _is(group, "Group") else []
+
+    def numbered(self, inside: str) -> list[int]:
+        """The numbers that are names in a group, in order."""
+        return sorted(int(name) for name in self.keys(inside) if _NUMBER.fullmatch(name))
 
     def holds(self, inside: str) -> bool:
         """Whether there is a group or dataset at this path."""
@@ -95,10 +107,13 @@ class SmcFile:
         Args:
             inside: Path of the dataset.
             count: Highest number of bytes.
+
+        Raises:
+            CaptureError: If the file or the dataset is damaged.
         """
         with self._guard(inside):
-            node = self._find(inside)
-            plain = _is(node, "Dataset") and node.dtype == np.uint8 and node.ndim == 1
+            node = self._dataset(inside)
+            plain = node is not None and node.dtype == np.uint8 and node.ndim == 1
             return node[:count].tobytes() if plain else b""
 
     def numbers(
@@ -108,20 +123,24 @@ class SmcFile:
 
         Args:
             inside: Path of the dataset.
-            shape: Required shape, in which None allows any length; None allows any shape.
+            shape: Required shape, in which None allows any length up to `MOST_ROWS`; None allows
+                any shape.
             holes: Whether NaN is allowed, for unknown values.
 
         Raises:
             CaptureError: If the dataset has another shape or a value is not finite.
         """
-        values = self._read(inside)
-        if values is None:
-            return None
-        if shape is not None and not _fits(values.shape, shape):
-            wanted = " x ".join("any" if n is None else str(n) for n in shape) or "a single number"
-            raise CaptureError(
-                f"{self.path}: {inside} has shape {values.shape}, expected {wanted}."
-            )
+        with self._guard(inside):
+            node = self._dataset(inside)
+            if node is None:
+                return None
+            if shape is not None and not _fits(node.shape, shape):
+                raise CaptureError(
+                    f"{self.path}: {inside} has shape {node.shape}, expected {_written(shape)}."
+                )
+            if math.prod(node.shape) > LARGEST // np.dtype(np.float64).itemsize:
+                raise self._damaged(inside)
+            values = np.asarray(node[()])
         if values.dtype.kind not in "fiub" or not _sound(values, holes):
             raise CaptureError(f"{self.path}: {inside} holds values that are no finite numbers.")
         return values.astype(np.float64)
@@ -146,14 +165,24 @@ class SmcFile:
     def _read(self, inside: str) -> np.ndarray | None:
         """A whole dataset."""
         with self._guard(inside):
-            node = self._find(inside)
-            if node is None or _is(node, "Group"):
-                return None
-            if not _is(node, "Dataset"):
-                raise self._damaged(inside)
-            if node.external or node.is_virtual or node.dtype.hasobject or node.nbytes > LARGEST:
-                raise self._damaged(inside)
-            return None if node.shape is None else np.asarray(node[()])
+            node = self._dataset(inside)
+            return None if node is None else np.asarray(node[()])
+
+    def _dataset(self, inside: str) -> Any:
+        """A dataset that may be read, or None if missing or empty.
+
+        Its values must lie in this file, and neither they nor a piece that is unpacked for one of
+        them may be too large.
+        """
+        node = self._find(inside)
+        if node is None or _is(node, "Group"):
+            return None
+        if not _is(node, "Dataset"):
+            raise self._damaged(inside)
+        largest = max(node.nbytes, math.prod(node.chunks or (0,)) * node.dtype.itemsize)
+        if node.external or node.is_virtual or node.dtype.hasobject or largest > LARGEST:
+            raise self._damaged(inside)
+        return None if node.shape is None else node
 
     def _find(self, inside: str) -> Any:
         """A group or dataset by its path ("" is the file), or None.
@@ -198,10 +227,16 @@ class SmcFile:
 
 
 def _fits(found: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    """Whether a shape is the wanted one, where None stands for any length."""
+    """Whether a shape is the wanted one, where None stands for any length up to `MOST_ROWS`."""
     return len(found) == len(wanted) and all(
-        n in (None, m) for n, m in zip(wanted, found, strict=True)
+        m <= MOST_ROWS if n is None else n == m for n, m in zip(wanted, found, strict=True)
     )
+
+
+def _written(shape: tuple[int | None, ...]) -> str:
+    """A wanted shape, for people."""
+    lengths = (f"at most {MOST_ROWS}" if n is None else str(n) for n in shape)
+    return " x ".join(lengths) or "a single number"
 
 
 def _sound(values: np.ndarray, holes: bool) -> bool:

@@ -12,11 +12,10 @@ from ico3d.capture.finding import Finding, missing_and_damaged
 from ico3d.capture.headpose.from_landmarks import HeadMotion, head_from_landmarks
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.capture.smc.cameras import SmcCamera
-from ico3d.capture.smc.file import SmcFile
+from ico3d.capture.smc.file import MOST_ROWS, SmcFile
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
-MOST_FRAMES = 100_000
 MAGICS = (b"\xff\xd8\xff", b"\x89PNG")
 
 
@@ -125,7 +124,7 @@ def count_frames(file: SmcFile, groups: Sequence[str], pictures: str) -> int:
     except (TypeError, ValueError) as error:
         raise CaptureError(f"{file.path}: num_frame is damaged: fetch it again.") from error
     count = max(counts) if counts else len(file.keys(pictures))
-    if not 1 <= count <= MOST_FRAMES:
+    if not 1 <= count <= MOST_ROWS:
         raise CaptureError(f"{file.path} announces {count} frames: fetch it again.")
     return count
 

@@ -11,6 +11,7 @@ from ico3d.bundle import evaluate, limits, manifest
 from ico3d.chat.observing.timing import PARTS
 from ico3d.chat.wire.protocol_visits import MAX_NOTE, MAX_NOTES
 from ico3d.common.expression import EYE_NAMES, LIDS
+from ico3d.common.spz import container
 from ico3d.motion import roles
 from ico3d.rig import shadow_map
 from ico3d.rig.rig import MOST_JOINTS
@@ -25,6 +26,15 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ("BUNDLE_VERSION", "The newest version of a manifest.", manifest.VERSION),
     ("OLDEST_BUNDLE", "The oldest version that is read.", manifest.OLDEST),
     ("MAX_GAUSSIANS", "Of a head or a window of a body; bundle/limits.py.", limits.MAX_GAUSSIANS),
+    (
+        "SPZ",
+        "What SPZ files may unpack to, and their highest degree; common/spz/container.py.",
+        {
+            "ratio": container.MAX_RATIO,
+            "free": container.FREE_BYTES,
+            "degree": container.MAX_DEGREE,
+        },
+    ),
     ("MAX_SHAPES", "Residual shapes of a body on a skeleton.", limits.MAX_SHAPES),
     ("MAX_JOINTS", "Of a body's skeleton; rig/rig.py.", MOST_JOINTS),
     ("MAX_CLUSTERS", "Groups of Gaussians in a window that move alike.", limits.MAX_CLUSTERS),

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ico3d.common.files import write_atomic
+from ico3d.common.spz.container import GZIP_MAGIC, MAGIC
 from ico3d.errors import GaussianFileError, SettingsError
 from ico3d.splat.files import compressed_ply, ply, splat, spz, standard_ply
 from ico3d.splat.files.raw import RawGaussians
-from ico3d.splat.files.spz_container import GZIP_MAGIC, MAGIC
 
 _WRITERS = {".ply": standard_ply.write, ".spz": spz.write}
 _HEAD_BYTES = 64 * 32

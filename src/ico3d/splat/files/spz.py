@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ico3d.common.spz.container import Header, unpack
 from ico3d.errors import GaussianFileError
 from ico3d.splat.files.raw import Floats, RawGaussians, half_turn_in_place, logits
-from ico3d.splat.files.spz_container import Header, unpack
 
 VERSION = 3
 FRACTIONAL_BITS = 12

@@ -1,5 +1,8 @@
 import { readPly } from './ply.ts';
 import { readSpz } from './spz.ts';
+import { isPacked, unpack, unreadable } from './unpacking.ts';
+
+const PLAIN = /^(ply|NGSP)/;
 
 /** A file of splats. */
 export interface SplatFile {
@@ -17,7 +20,18 @@ export function isTurned({ name }: SplatFile): boolean {
  * file and with the axes of the world. Seen from everywhere they have the colour of their mean.
  *
  * @returns null for a kind that only Spark reads: compressed PLY, SPZ of version 4
+ * @throws PageError if it is damaged
  */
 export async function readSplats(file: SplatFile): Promise<Float32Array | null> {
-  return isTurned(file) ? readSpz(file.bytes) : readPly(file.bytes);
+  return isTurned(file) ? readSpz(file.bytes, file.name) : readPly(file.bytes);
+}
+
+/**
+ * Checks a file before Spark reads it, which tells kinds by their first bytes, and unpacks without a limit.
+ *
+ * @throws PageError if it is of no kind that a background may have, or unpacks to more than its header promises
+ */
+export async function checkSplats({ name, bytes }: SplatFile): Promise<void> {
+  if (isPacked(bytes)) await unpack(bytes, name);
+  else if (!PLAIN.test(new TextDecoder('latin1').decode(new Uint8Array(bytes, 0, Math.min(4, bytes.byteLength))))) throw unreadable(name);
 }

@@ -1,10 +1,10 @@
 import { dyno, SplatMesh } from '@sparkjsdev/spark';
 import type { Actor } from '../../actor.ts';
-import { PageError } from '../../errors.ts';
 import type { SoftObject, Source } from '../../soft/source.ts';
-import { isTurned, type SplatFile } from './file.ts';
+import { checkSplats, isTurned, type SplatFile } from './file.ts';
 import { APART, HASH, NUMBERS, sizeOf, sourceOf } from './rows.ts';
 import type { StillGenerator } from './still.ts';
+import { unreadable } from './unpacking.ts';
 
 /** The splats behind the person, which stand still. */
 class Backdrop implements Actor {
@@ -68,10 +68,11 @@ function pack(mesh: SplatMesh): Source {
 
 /** Reads the splats behind the person. */
 export async function makeBackdrop(file: SplatFile): Promise<Actor> {
+  await checkSplats(file);
   const least = { value: 0 };
   const mesh = makeMesh(file, least);
   await mesh.initialized.catch(() => {
-    throw new PageError(`${file.name} holds no splats that this page can read.`);
+    throw unreadable(file.name);
   });
   return new Backdrop(mesh, least);
 }

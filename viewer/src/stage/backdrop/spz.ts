@@ -1,24 +1,19 @@
 import { colourOf, NUMBERS } from './rows.ts';
+import { HEADER, isPacked, unpack } from './unpacking.ts';
 
-const GZIP = 0x8b1f;
-const MAGIC = 0x5053474e; // NGSP
-const HEADER = 16; // bytes
 const COLOUR_SCALE = 0.15;
 const SMALL = Math.SQRT1_2 / 511; // step of a quaternion's smaller components: 9 bits for up to √½
 
 /**
  * Reads an SPZ file of version 2 or 3: a gzip stream of one table after the other.
  *
- * @returns rows as `readSplats` gives them; null if it is of another kind, or damaged
+ * @returns rows as `readSplats` gives them; null if it is of another kind
+ * @throws PageError if it is damaged
  */
-export async function readSpz(bytes: ArrayBuffer): Promise<Float32Array | null> {
-  if (bytes.byteLength < 2 || new DataView(bytes).getUint16(0, true) !== GZIP) return null;
-  const unpacked = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))).arrayBuffer().catch(() => null);
-  if (!unpacked || unpacked.byteLength < HEADER) return null;
-  const data = new DataView(unpacked);
-  const [magic, version, count] = [0, 4, 8].map((at) => data.getUint32(at, true)) as [number, number, number];
-  const turning = version === 2 ? 3 : 4; // bytes of a rotation
-  if (magic !== MAGIC || (version !== 2 && version !== 3) || unpacked.byteLength < HEADER + count * (16 + turning)) return null;
+export async function readSpz(bytes: ArrayBuffer, name: string): Promise<Float32Array | null> {
+  if (!isPacked(bytes)) return null;
+  const data = new DataView((await unpack(bytes, name)).buffer);
+  const [version, count] = [data.getUint32(4, true), data.getUint32(8, true)];
   const step = 2 ** -data.getUint8(13); // m
   const [alphas, colours, scales, rotations] = [9, 10, 13, 16].map((before) => HEADER + before * count) as [number, number, number, number];
   const rows = new Float32Array(NUMBERS * count);

@@ -1,6 +1,6 @@
 import { gzipSync } from 'node:zlib';
-import { describe, expect, test } from 'vitest';
-import { readSplats } from '../../../src/stage/backdrop/file.ts';
+import { describe, expect, test, vi } from 'vitest';
+import { checkSplats, readSplats } from '../../../src/stage/backdrop/file.ts';
 import { makeStillBackdrop, StillGenerator } from '../../../src/stage/backdrop/still.ts';
 
 const HARMONIC = 0.28209479177387814;
@@ -68,11 +68,48 @@ describe('splats behind a person', () => {
     expect(await rowsOf('background.ply', ply([row], COLUMNS, 'binary_big_endian'))).toBeNull();
     expect(await rowsOf('background.ply', ply([row]).slice(0, -1))).toBeNull();
     expect(await rowsOf('background.ply', new ArrayBuffer(3))).toBeNull();
-    expect(await rowsOf('background.spz', spz(4, 0, []))).toBeNull();
     expect(await rowsOf('background.spz', spz(4, 0, [], (bytes) => bytes))).toBeNull();
-    expect(await rowsOf('background.spz', spz(3, 1, [Array(19).fill(0)]))).toBeNull(); // a byte is missing
-    expect(await rowsOf('background.spz', spz(3, 1, [Array(20).fill(0)]).slice(0, -9))).toBeNull();
     expect(await makeStillBackdrop({ name: 'background.ply', bytes: new ArrayBuffer(3) })).toBeNull();
+  });
+
+  const row = Array(20).fill(0);
+  const whole = spz(3, 1, [row]);
+  test.each([
+    ['of another version', spz(4, 1, [row])],
+    ['of no splats', spz(3, 0, [])],
+    ['that lacks a byte', spz(3, 1, [row.slice(1)])],
+    ['of a header alone, cut', new Uint8Array(gzipSync(new Uint8Array(9))).buffer],
+    ['that is cut off', whole.slice(0, -9)],
+    ['that cannot hold what it promises', spz(3, 900_000, [row])],
+    ['that goes on behind its splats', spz(3, 1, [row, [0]])],
+  ])('are refused in a packed file %s', async (_, bytes) => {
+    const sentence = 'background.spz holds no splats that this page can read.';
+    await expect(rowsOf('background.spz', bytes)).rejects.toThrow(sentence);
+    await expect(checkSplats({ name: 'background.spz', bytes })).rejects.toThrow(sentence);
+  });
+
+  test('are checked before Spark reads them', async () => {
+    await checkSplats({ name: 'background.spz', bytes: whole });
+    await checkSplats({ name: 'background.ply', bytes: ply([]) });
+    const zip = new TextEncoder().encode('PK\x03\x04').buffer;
+    await expect(checkSplats({ name: 'background.ply', bytes: zip })).rejects.toThrow('no splats that this page can read');
+  });
+
+  test('are not unpacked further than their header promises', async () => {
+    let unpacked = 0; // bytes
+    const Stream = DecompressionStream;
+    vi.stubGlobal('DecompressionStream', function (kind: 'gzip') {
+      const { readable, writable } = new Stream(kind);
+      const transform = (part: Uint8Array, controller: TransformStreamDefaultController) => {
+        unpacked += part.length;
+        controller.enqueue(part);
+      };
+      return { writable, readable: readable.pipeThrough(new TransformStream({ transform })) };
+    });
+    const bytes = spz(3, 1, [row], (all) => gzipSync(Buffer.concat([all, Buffer.alloc(32 << 20)])));
+    await expect(rowsOf('background.spz', bytes)).rejects.toThrow('no splats that this page can read');
+    vi.unstubAllGlobals();
+    expect(unpacked).toBeLessThan(8 << 20);
   });
 
   test('are drawn the largest ones first, and a share of them where pictures take too long', async () => {

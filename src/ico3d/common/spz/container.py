@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ico3d.errors import GaussianFileError, MissingExtraError
-from ico3d.splat.harmonics import MAX_DEGREE
 
 MAGIC = b"NGSP"
 GZIP_MAGIC = b"\x1f\x8b"
 MAX_FRACTIONAL_BITS = 24
+MAX_DEGREE = 3
+"""Highest degree of spherical harmonics."""
 _HEADER = struct.Struct("<4sIIBBBB")
 _HEADER_4 = struct.Struct("<I12x")  # what version 4 has more
 _STREAM = struct.Struct("<QQ")
@@ -88,6 +89,33 @@ def parse_header(head: bytes) -> Header:
     return Header(version, count, degree, bits, flags, streams)
 
 
+def read_header(data: bytes) -> Header:
+    """The header of an SPZ file; nothing else is unpacked.
+
+    Raises:
+        GaussianFileError: If the file has none that can be read.
+    """
+    return _open_gzip(data)[1] if data[:2] == GZIP_MAGIC else parse_header(data[: _HEADER.size])
+
+
+def check(data: bytes) -> None:
+    """Unpacks a file of version 2 or 3 to its end, a piece at a time, and keeps nothing of it.
+
+    Of version 4 only the header is checked.
+
+    Raises:
+        GaussianFileError: As for `unpack`.
+    """
+    if data[:2] != GZIP_MAGIC:
+        return _check_promise(read_header(data), len(data))
+    stream, header = _open_gzip(data)
+    _check_promise(header, len(data))
+    found = 0
+    while found < header.size and (piece := stream.read(min(_PIECE, header.size - found))):
+        found += len(piece)
+    return _finish(stream, header, found, len(data))
+
+
 def unpack(data: bytes) -> tuple[Header, dict[str, NDArray[np.uint8]]]:
     """The header and the decompressed attributes, each (N, bytes), of an SPZ file.
 
@@ -111,14 +139,13 @@ def _allowed_bytes(size: int) -> int:
     return MAX_RATIO * size + FREE_BYTES
 
 
-def _buffer_for(header: Header, size: int) -> NDArray[np.uint8]:
-    """Room for the attributes, refused where a file of this size cannot hold them."""
+def _check_promise(header: Header, size: int) -> None:
+    """Refuses more Gaussians than a file of this size can hold."""
     if header.size > _allowed_bytes(size):
         raise GaussianFileError(
             f"the count at byte 8 promises {header.count} Gaussians, {header.size} bytes unpacked: "
             f"more than a file of {size} bytes can hold, so it is damaged or hostile"
         )
-    return np.empty(header.size, np.uint8)
 
 
 class _Inflater:
@@ -168,27 +195,40 @@ def _read_exactly(stream: _Inflater, target: memoryview) -> int:
     return filled
 
 
-def _unpack_gzip(data: bytes) -> tuple[Header, NDArray[np.uint8]]:
-    """Header and attributes of versions 2 and 3."""
+def _open_gzip(data: bytes) -> tuple[_Inflater, Header]:
+    """The stream of versions 2 and 3, behind its header."""
     stream = _Inflater(data)
     head = bytearray(_HEADER.size)
     header = parse_header(bytes(head[: _read_exactly(stream, memoryview(head))]))
     if header.version == 4:
         raise GaussianFileError("SPZ version 4 at byte 4 of a gzip stream: expected 2 or 3")
-    packed = _buffer_for(header, len(data))
-    found = _read_exactly(stream, packed.data)
-    if found < len(packed):
-        raise GaussianFileError(
-            f"{header.count} Gaussians need {_HEADER.size + len(packed)} bytes unpacked, but there "
-            f"are {_HEADER.size + found}: the count at byte 8 is damaged"
-        )
-    _finish(stream, header, len(data))
+    return stream, header
+
+
+def _unpack_gzip(data: bytes) -> tuple[Header, NDArray[np.uint8]]:
+    """Header and attributes of versions 2 and 3."""
+    stream, header = _open_gzip(data)
+    _check_promise(header, len(data))
+    packed = np.empty(header.size, np.uint8)
+    _finish(stream, header, _read_exactly(stream, packed.data), len(data))
     return header, packed
 
 
-def _finish(stream: _Inflater, header: Header, size: int) -> None:
-    """Goes to the end of the stream, past what the header's flags announce."""
+def _finish(stream: _Inflater, header: Header, found: int, size: int) -> None:
+    """Goes to the end of the stream, past what the header's flags announce.
+
+    Args:
+        stream: Behind the attributes.
+        header: The file's header.
+        found: Bytes of the attributes that the stream had.
+        size: Bytes of the file.
+    """
     end = _HEADER.size + header.size
+    if found < header.size:
+        raise GaussianFileError(
+            f"{header.count} Gaussians need {end} bytes unpacked, but there are "
+            f"{_HEADER.size + found}: the count at byte 8 is damaged"
+        )
     rest = 0
     while piece := stream.read(_PIECE):
         rest += len(piece)
@@ -205,7 +245,8 @@ def _unpack_zstd(data: bytes) -> tuple[Header, NDArray[np.uint8]]:
     header = parse_header(data[: _HEADER.size])
     if header.version != 4:
         raise GaussianFileError(f"SPZ version {header.version} at byte 4 of a file without gzip")
-    packed = _buffer_for(header, len(data))
+    _check_promise(header, len(data))
+    packed = np.empty(header.size, np.uint8)
     offset, filled = _first_stream(data, header), 0
     table = offset - header.streams * _STREAM.size
     for index, (name, width) in enumerate(header.sections.items()):

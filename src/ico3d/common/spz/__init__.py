@@ -1,0 +1,1 @@
+"""The container of SPZ files of Gaussians."""
