@@ -13,6 +13,7 @@ from ico3d.bundle.format import write_bundle
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
 from support.bundles.random_bundle import random_files, random_head, random_manifest
+from support.nested import nested
 from support.recordings.multiview_folders import entry, ring, write_cameras
 
 
@@ -220,6 +221,16 @@ def test_a_strangers_folder_does_not_keep_anybody_from_being_forgotten(tmp_path,
     (model(work / "d") / "head.json").symlink_to("/dev/zero")
     assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
     assert not ada.exists() and stranger.exists()
+
+
+def test_folders_nested_deep_are_no_obstacle(tmp_path, capsys):
+    work = tmp_path / "work"
+    ada = bundle_in(work / "a", "Ada")
+    with nested(work):
+        assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
+        assert not ada.exists()
+        assert main(["forget", str(work / "d"), "--project", str(work), "--yes"]) == 1
+    assert "all is gone but" in capsys.readouterr().err
 
 
 def test_a_terminal_obeys_nothing_that_a_bundle_says(tmp_path, capsys):

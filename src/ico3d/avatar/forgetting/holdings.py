@@ -1,6 +1,5 @@
 """What a project folder holds of people: recordings, models, runs, bundles, and whose they are."""
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,7 @@ from ico3d.avatar.models import KINDS
 from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST, Manifest
-from ico3d.common.files import read_object
+from ico3d.common.files import read_object, walk
 from ico3d.common.people.stated import BETWEEN, NOBODY, is_stated
 from ico3d.errors import Ico3dError
 
@@ -71,9 +70,8 @@ def find_holdings(project: Path) -> list[Holding]:
 
 
 def _walk(project: Path) -> Iterator[Holding]:
-    for place, folders, files in os.walk(project):
+    for folder, folders, files in walk(project):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        folder = Path(place)
         linked = (folder / name for name in folders if (folder / name).is_symlink())
         for candidate in (folder, *linked):
             if candidate != project and (found := _folder(candidate)) is not None:
