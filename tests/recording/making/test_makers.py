@@ -118,6 +118,21 @@ def test_who_asks_how_far_it_is_brings_nothing_back_that_is_deleted_meanwhile(
     assert [path.name for path in people.folder.iterdir()] == ["Ida"]
 
 
+def test_a_log_that_leads_elsewhere_is_not_written(people, makers, tmp_path):
+    ada, elsewhere = people.person("Ada"), tmp_path / "elsewhere"
+    log = Places(ada.folder).folder / "log.txt"
+    log.parent.mkdir()
+    elsewhere.touch()
+    log.symlink_to(elsewhere)
+    makers.begin(ada, "quick")
+    _until(lambda: makers.progress(ada).state != "running")
+    assert log.is_file() and not log.is_symlink()
+    log.unlink()
+    os.mkfifo(log)
+    makers.begin(ada, "quick")
+    assert log.is_file()
+
+
 def test_a_server_that_comes_back_goes_on(people, makers):
     ada = people.person("Ada")
     makers.begin(ada, "good")

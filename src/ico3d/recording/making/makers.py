@@ -118,7 +118,10 @@ class Makers:
             folder.mkdir(exist_ok=True)
             of = self._made_of(person)
             write_progress(folder, begun(folder, cast(QualityName, quality), of))
-            with (folder / LOG).open("ab") as log:
+            log_file = folder / LOG
+            if log_file.is_symlink() or not log_file.is_file():  # nothing of ours
+                log_file.unlink(missing_ok=True)
+            with log_file.open("ab") as log:
                 words = [str(person.folder), quality, *of["on"]]
                 self._running[person.name] = start(self._worker, words, log)
 

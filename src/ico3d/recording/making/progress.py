@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from PIL import Image
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.typed import parse_json, plain
 from ico3d.creating.events import Advanced, Event, Looked, Made, Planned, Preview, Step, Voiced
 from ico3d.creating.looking.advice import Advice, Level
@@ -60,7 +60,8 @@ class Progress:
 def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""
     try:
-        found = Progress(**parse_json((folder / FILE).read_bytes(), FILE, ValueError))
+        data = read_small(folder / FILE, links=False)
+        found = Progress(**parse_json(data, FILE, ValueError))
         of = dict(found.made_of)
         return replace(found, advice=tuple(found.advice), refused=tuple(found.refused), made_of=of)
     except (OSError, ValueError, TypeError, KeyError):
