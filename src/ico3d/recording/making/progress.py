@@ -56,6 +56,14 @@ class Progress:
     decibels: float | None = None
     made_of: dict[str, Any] = field(default_factory=dict)
 
+    def is_of(self, id: str) -> bool:
+        """Whether the avatar is made of a part; also where it is not known of which."""
+        parts = self.made_of.get("parts")
+        if not isinstance(parts, list):
+            return True
+        names = [str(one[0]) for one in parts if isinstance(one, list) and one]
+        return any(name.partition(".")[0] == id for name in names)
+
 
 def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""

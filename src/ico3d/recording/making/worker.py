@@ -96,6 +96,7 @@ def _video(person: Person, places: Places) -> Path:
     if _before(places) != now or not video.is_file():
         shutil.rmtree(places.work, ignore_errors=True)
         places.made.unlink(missing_ok=True)
+        places.joined.unlink(missing_ok=True)
         if video == places.joined:
             join(files, video)
         write_atomic(places.joined_of, json.dumps(now).encode())
