@@ -1,10 +1,12 @@
 """Files are whole or not there."""
 
+import os
 from pathlib import Path
 
 import pytest
 
-from ico3d.common.files import remove_unfinished, write_atomic
+from ico3d.common import files
+from ico3d.common.files import read_small, remove_unfinished, walk, write_atomic
 
 
 def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -30,3 +32,33 @@ def test_what_killed_writers_left_is_removed_and_nothing_else(tmp_path, name):
     (tmp_path / seen[0]).touch()  # as a writer killed before the rename leaves it
     remove_unfinished(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {name, *others}
+
+
+def test_of_anybodys_files_only_small_regular_ones_are_read(tmp_path, monkeypatch):
+    file, link, pipe = tmp_path / "a.json", tmp_path / "b.json", tmp_path / "c.json"
+    file.write_bytes(b"{}")
+    link.symlink_to(file)
+    os.mkfifo(pipe)
+    assert read_small(file) == read_small(link) == read_small(file, links=False) == b"{}"
+    (tmp_path / "d.json").symlink_to("/dev/zero")
+    for refused in (pipe, tmp_path / "d.json", tmp_path / "none.json", tmp_path):
+        with pytest.raises(OSError, match=r"."):
+            read_small(refused)
+    with pytest.raises(OSError, match="symbolic links"):
+        read_small(link, links=False)
+    monkeypatch.setattr(files, "MOST_NOTES", 1)
+    with pytest.raises(OSError, match="no small file"):
+        read_small(file)
+
+
+def test_folders_are_walked_as_by_the_system_and_links_are_not(tmp_path):
+    for name in ("b/c", "a"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "b" / "f").touch()
+    (tmp_path / "a" / "up").symlink_to(tmp_path)
+    (tmp_path / "b" / "round").symlink_to("round")
+    found = [(str(place), sorted(inside), sorted(names)) for place, inside, names in walk(tmp_path)]
+    expected = [
+        (place, sorted(inside), sorted(names)) for place, inside, names in os.walk(tmp_path)
+    ]
+    assert sorted(found) == sorted(expected)

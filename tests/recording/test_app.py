@@ -198,6 +198,17 @@ def test_what_was_made_so_far_is_discarded_and_the_recordings_stay(page, room, v
     assert gone["making"] is None and _state(gone, "text-1") == "kept" and not folder.exists()
 
 
+def test_the_consent_that_is_taken_back_takes_along_what_is_being_made(page, room, video):
+    _send(page, "text-1", video)
+    places = Places(room.people.folder / "Ida")
+    places.folder.mkdir()
+    places.joined.touch()
+    write_progress(places.folder, Progress("running", "quick", "learn", 0.4))
+    status = page.delete("/recordings/Ida/parts/consent").json()
+    assert _state(status, "consent") == "missing" and not places.joined.exists()
+    assert status["making"]["state"] == "stopped"
+
+
 def test_a_form_nested_deep_is_none(page):
     answer = page.post("/recordings/Ida/making", content=b"[" * 4000)
     assert (answer.status_code, answer.json()["code"]) == (400, "quality")

@@ -1,5 +1,6 @@
 """What the verb `ico3d studio` prints, as a process of its own."""
 
+import stat
 import subprocess
 import sys
 
@@ -10,7 +11,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("verb", ["studio", "serve"])
 def test_the_first_thing_printed_is_the_address(verb, tmp_path):
-    words = [str(tmp_path), "--no-browser"] if verb == "studio" else ["demo"]
+    words = [str(tmp_path / "faces"), "--no-browser"] if verb == "studio" else ["demo"]
     server = subprocess.Popen(
         [sys.executable, "-m", "ico3d.cli", verb, *words, "--port", "0"],
         stdout=subprocess.PIPE,
@@ -24,3 +25,5 @@ def test_the_first_thing_printed_is_the_address(verb, tmp_path):
         server.communicate()
     name = b"The studio" if verb == "studio" else b"Iris"
     assert first.startswith(name + b" is at http://127.0.0.1:")
+    if verb == "studio":  # nobody else on the machine reads recordings
+        assert stat.S_IMODE((tmp_path / "faces").stat().st_mode) == 0o700

@@ -1,11 +1,12 @@
-"""Writes files so that a crash never leaves half of one; reads small ones of anybody."""
+"""Writes files so that a crash never leaves half of one; finds and reads small ones of anybody."""
 
 import errno
 import json
 import os
 import re
 import secrets
-from collections.abc import Callable, Generator
+import stat
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -16,7 +17,10 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 """Names that `write_atomic` gives to unfinished files."""
 
 MOST_NOTES = 64 << 20
-"""Bytes of a file of JSON that `read_object` reads."""
+"""Bytes of a file that `read_small` reads."""
+
+LONGEST = 3_500
+"""Characters of a path below which `walk` looks: systems end at 4,096 bytes, names of files too."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a system says when a disk, a quota or the limit of a file's size is reached."""
@@ -83,17 +87,61 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def read_object(file: Path) -> dict[str, Any]:
-    """The object in a file of JSON, which may be anybody's; empty where there is none.
-
-    Nothing is read that has no end, such as what a link to a device leads to.
-    """
+    """The object in a file of JSON, which may be anybody's; empty where there is none."""
     try:
-        if not file.is_file() or file.stat().st_size > MOST_NOTES:
-            return {}
-        content: object = json.loads(file.read_text("utf-8"))
+        content: object = json.loads(read_small(file).decode("utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     return cast(dict[str, Any], content) if isinstance(content, dict) else {}
+
+
+def read_small(file: Path, links: bool = True) -> bytes:
+    """The content of a small file, which may be anybody's.
+
+    Nothing is read that has no end, such as what a link to a device leads to, and nobody waits for
+    a pipe.
+
+    Args:
+        file: The file.
+        links: Whether it may be a link to a file.
+
+    Raises:
+        OSError: If it is not there, no regular file, or larger than `MOST_NOTES`.
+    """
+    how = 0 if links else getattr(os, "O_NOFOLLOW", 0)
+    how |= os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with open(os.open(file, how), "rb") as opened:
+        about = os.fstat(opened.fileno())
+        if not stat.S_ISREG(about.st_mode) or about.st_size > MOST_NOTES:
+            raise OSError(errno.EINVAL, "it is no small file", str(file))
+        return opened.read(MOST_NOTES)
+
+
+def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
+    """As `os.walk`, from above, but without an end of Python's stack in folders of anybody."""
+    waiting = [os.fspath(folder)]
+    while waiting:
+        place = waiting.pop()
+        folders, files = [], []
+        try:
+            with os.scandir(place) as entries:
+                for entry in entries:
+                    (folders if _is_folder(entry) else files).append(entry.name)
+        except OSError:  # not ours to read, or gone
+            continue
+        yield Path(place), folders, files
+        below = (os.path.join(place, name) for name in reversed(folders))
+        waiting += [
+            path for path in below if len(os.fsencode(path)) < LONGEST and not os.path.islink(path)
+        ]
+
+
+def _is_folder(entry: os.DirEntry) -> bool:
+    """Whether an entry is a folder, or a link to one; a link in a circle is none."""
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False
 
 
 def _sync_folder(folder: Path) -> None:

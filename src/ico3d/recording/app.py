@@ -207,7 +207,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
     async def remove(name: str, id: str) -> Response:
         async with room.lock(name):
             person = room.people.person(name)
-            await asyncio.to_thread(person.remove, id)
+            await asyncio.to_thread(room.makers.withdraw, person, id)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.post(ROOT + "{name}/look")

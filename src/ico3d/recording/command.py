@@ -1,5 +1,6 @@
 """The verb `ico3d studio`."""
 
+import os
 import sys
 import webbrowser
 from dataclasses import dataclass
@@ -11,6 +12,10 @@ import tyro
 from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
 from ico3d.avatar.embodying.look import AS_RECORDED, Look, OutfitName, check_look
 from ico3d.bundle.packaged import NAME
+
+OWN = 0o077
+"""Umask of the server and of all that it starts: faces are for who records them, not for all users
+of the machine."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,7 @@ class Studio:
         reach = find_reach(self.host, (), self.tls, None, None)
         key = shown_key(reach.is_public, False, Embedding())
         sites = open_sites(Embedding(), key or "")
+        os.umask(OWN)
         listener = server.bind(self.host, self.port)
         try:
             where = (self.folder.absolute(), self.host, self.tls)

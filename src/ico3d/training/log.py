@@ -65,6 +65,8 @@ def _is_before(line: str, step: int) -> bool:
 
 def latest_entry(folder: Path) -> dict | None:
     """The last entry of a run's metrics.jsonl, or None; a training may be writing to the file."""
+    if not (folder / METRICS).is_file():
+        return None
     try:
         with (folder / METRICS).open("rb") as file:
             file.seek(max(file.seek(0, os.SEEK_END) - TAIL, 0))
@@ -72,9 +74,15 @@ def latest_entry(folder: Path) -> dict | None:
     except FileNotFoundError:
         return None
     try:
-        return json.loads(whole.rpartition(b"\n")[2]) if whole else None
-    except ValueError:  # damaged by the disk
+        entry = json.loads(whole.rpartition(b"\n")[2]) if whole else None
+    except (ValueError, RecursionError):  # damaged by the disk
         return None
+    return entry if isinstance(entry, dict) and is_step(entry.get("step")) else None
+
+
+def is_step(value: object) -> bool:
+    """Whether a value that was read is the number of a step."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def readable(numbers: Mapping[str, float]) -> str:

@@ -10,6 +10,7 @@ from torch import Tensor
 from ico3d.common.files import remove_unfinished, write_atomic
 from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import check_seal, load_sealed, load_state, save_sealed
+from ico3d.training.log import is_step
 from ico3d.training.notes.lock import locked
 from ico3d.training.notes.state import begun, ended, note
 
@@ -149,7 +150,7 @@ def checkpoint_state(folder: Path) -> dict | None:
     """
     for name in CHECKPOINTS:
         try:
-            return load_state(folder / name)
+            return _told(folder / name, load_state(folder / name))
         except ModelError:
             continue
     return None
@@ -180,7 +181,7 @@ def _checked(file: Path, names: Set[str]) -> tuple[dict[str, Tensor], dict]:
 
 def _told(file: Path, state: object) -> dict:
     """Raises ModelError if the state of a checkpoint lacks a part."""
-    if not isinstance(state, dict) or not state.keys() >= set(PARTS):
+    if not isinstance(state, dict) or not state.keys() >= set(PARTS) or not is_step(state["step"]):
         raise ModelError(f"{file} is no checkpoint of a training.")
     return state
 

@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 from ico3d.avatar.forgetting.removal import remove
+from ico3d.bundle.archive import write_zip
 from ico3d.bundle.format import write_bundle
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
 from support.bundles.random_bundle import random_files, random_head, random_manifest
+from support.nested import nested
 from support.recordings.multiview_folders import entry, ring, write_cameras
 
 
@@ -128,6 +130,41 @@ def test_an_avatar_of_two_people_does_not_take_the_other_along(project):
     assert there(project) == (OTHERS | SHOWING_ADA) - {"captures/bob", "models/bob", "bob.ico3d"}
 
 
+@pytest.mark.parametrize("word", ["JOSÉ", "Jose\u0301", "josé"])
+@pytest.mark.parametrize("stated", ["José", "Jose\u0301", "JOSE\u0301 "])
+def test_a_name_is_found_however_it_is_written(tmp_path, word, stated):
+    bundle(tmp_path / "a.ico3d", stated)
+    assert main(["forget", word, "--project", str(tmp_path), "--yes"]) == 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_bundle_is_found_whatever_its_file_is_called(project):
+    for name in ("copy.zip", "copy.ICO3D", "copy", "copy.ico3d.bak"):
+        bundle(project / name, "Ada")
+    others = {project / "bob.zip", project / "other.zip", project / "damaged.zip"}
+    bundle(project / "bob.zip", "Bob")
+    write_zip(project / "other.zip", {"manifest.json": b'{"name": "Ada"}'})
+    (project / "damaged.zip").write_bytes(b"PK\3\4")
+    os.mkfifo(project / "pipe")
+    assert main(["forget", "Ada", "--yes"]) == 0
+    assert not list(project.glob("copy*")) and others < set(project.iterdir())
+
+
+def test_what_create_left_on_the_way_is_found_by_name_and_with_the_bundle(project, capsys):
+    for words in (["Ada"], ["ada.ico3d"]):
+        bundle(project / "ada.ico3d", "Ada")
+        places = project / "Ada.work", project / "Bob.work", project / "renamed"
+        for place in places:
+            (place / ".capture-fine.abc").mkdir(parents=True, exist_ok=True)
+            (place / ".capture-fine.abc" / "0.jpg").touch()
+            (place / "about.json").write_text('{"video": "ada.mp4", "sha256": "0"}')
+        assert main(["forget", *words, "--yes"]) == 0
+        assert [place.exists() for place in places] == [False, True, True]
+        said = capsys.readouterr().out
+        assert f"{places[0]}: a workplace of Ada" in said
+        assert f"- {places[2]}, a workplace that does not say whom it shows: look at it" in said
+
+
 def test_links_go_and_what_they_lead_to_is_named(project, tmp_path, capsys):
     elsewhere = recording(tmp_path / "archive", likeness="Ada")
     (project / "captures/linked").symlink_to(elsewhere)
@@ -220,6 +257,16 @@ def test_a_strangers_folder_does_not_keep_anybody_from_being_forgotten(tmp_path,
     (model(work / "d") / "head.json").symlink_to("/dev/zero")
     assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
     assert not ada.exists() and stranger.exists()
+
+
+def test_folders_nested_deep_are_no_obstacle(tmp_path, capsys):
+    work = tmp_path / "work"
+    ada = bundle_in(work / "a", "Ada")
+    with nested(work):
+        assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
+        assert not ada.exists()
+        assert main(["forget", str(work / "d"), "--project", str(work), "--yes"]) == 1
+    assert "all is gone but" in capsys.readouterr().err
 
 
 def test_a_terminal_obeys_nothing_that_a_bundle_says(tmp_path, capsys):

@@ -1,12 +1,14 @@
 """Whose recordings there are: names, consent, room on the disk, and that deleting is deleting."""
 
 import json
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.common.people.stated import is_stated
-from ico3d.errors import SettingsError
+from ico3d.errors import SettingsError, StorageError
 from ico3d.recording.keeping import people as room
 from ico3d.recording.keeping.people import People
 from ico3d.recording.refusals import Refused
@@ -73,6 +75,32 @@ def test_without_consent_nothing_begins(tmp_path, name, language, agreed, code):
     with pytest.raises(Refused) as refused:
         People(tmp_path).begin(name, language, agreed, DAY)
     assert refused.value.code == code and People(tmp_path).names() == ["Ida"]
+
+
+def test_of_those_who_begin_at_once_under_one_name_one_does(tmp_path, monkeypatch):
+    people, together = People(tmp_path), threading.Barrier(2)
+    monkeypatch.setattr(people, "check_room", lambda: together.wait(5))  # the last look before
+
+    def begin(voice):
+        try:
+            return people.begin("Ida", "en", True, DAY, voice).consent()
+        except Refused as refused:
+            return refused.code
+
+    with ThreadPoolExecutor(2) as threads:
+        ends = list(threads.map(begin, (True, False)))
+    assert ends.count("taken") == 1 and people.person("Ida").consent() in ends
+
+
+def test_a_name_is_free_after_a_disk_that_was_full(tmp_path, monkeypatch):
+    def full(*_):
+        raise StorageError("the disk is full.")
+
+    monkeypatch.setattr(room, "write_atomic", full)
+    with pytest.raises(StorageError):
+        begun(tmp_path)
+    monkeypatch.undo()
+    assert begun(tmp_path).name == "Ida"
 
 
 def test_a_folder_holds_so_many_people_and_a_disk_so_much(tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 from ico3d.recording.keeping import person as room
 from ico3d.recording.keeping.containers import suffix_of
 from ico3d.recording.refusals import Refused
+from support.not_ours import replacements
 from support.studio_page.parts import begun, kept
 
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)
@@ -149,3 +150,18 @@ def test_a_damaged_report_says_nothing(person, text):
     (person.folder / "parts" / "left.json").write_text(text)
     (part,) = person.parts()
     assert part.report == {"seconds": 0.0, "turn": None, "advice": []}
+
+
+def test_what_lies_elsewhere_is_not_read(person):
+    kept(person, "left", WEBM, turn=0.3)
+    about, parts = person.consent(), person.folder / "parts"
+    for _ in replacements(person.folder / "consent.json"):
+        assert _codes(person.consent) == ("unknown", 404)
+    assert person.consent() == about
+    for _ in replacements(parts / "left.json"):
+        (part,) = person.parts()
+        assert part.report == room.UNSEEN
+    for _ in replacements(parts / "left.webm"):
+        assert not list(person.parts())
+    (part,) = person.parts()
+    assert part.report["turn"] == 0.3

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from ico3d.avatar.embodying.look import Look
+from ico3d.errors import StorageError
 from ico3d.failures import FAILURES
 from ico3d.recording.keeping.body_choice import BodyChoice, write_choice
 from ico3d.recording.keeping.people import People
@@ -116,6 +117,77 @@ def test_who_asks_how_far_it_is_brings_nothing_back_that_is_deleted_meanwhile(
     assert makers.progress(ada).state == "failed"
     other.join()
     assert [path.name for path in people.folder.iterdir()] == ["Ida"]
+
+
+def _on_the_way(person, made_of=None):
+    """Files of a making that was stopped."""
+    places = Places(person.folder)
+    files = places.joined, places.joined_of, places.made, places.work / "capture-fine" / "0.jpg"
+    files += (places.folder / ".joined.0123456789abcdef.mp4",)  # as killed writers leave them
+    for file in files:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.touch()
+    if made_of is not None:
+        write_progress(places.folder, Progress("stopped", "good", made_of=made_of))
+    return lambda: {file.exists() for file in files}
+
+
+def test_a_part_goes_with_what_was_made_of_it_on_the_way(people, makers):
+    ada = people.person("Ada")
+    places = Places(ada.folder)
+    places.avatar.touch()
+    for made_of in ({"parts": [["text-1.webm", 64, 0.0]]}, {}, {"parts": 3}):
+        kept(ada, "text-1", WEBM)
+        kept(ada, "text-2", WEBM)
+        there = _on_the_way(ada, made_of)
+        if made_of.get("parts") not in (None, 3):
+            makers.withdraw(ada, "text-2")  # recorded since
+            assert there() == {True} and [part.id for part in ada.parts()] == ["consent", "text-1"]
+        makers.withdraw(ada, "text-1")
+        assert there() == {False} and places.avatar.exists()
+        assert makers.progress(ada).state == "stopped"
+        ada.remove("text-2")
+    assert _codes(lambda: makers.withdraw(ada, "text-70")) == "part"
+
+
+def test_without_the_consent_nothing_goes_on(people, makers):
+    ada = people.person("Ada")
+    makers.begin(ada, "good")
+    _until(_began(ada).exists)
+    process, there = makers._running["Ada"], _on_the_way(ada)
+    makers.withdraw(ada, "consent")
+    assert process.poll() is not None and makers.progress(ada).state == "stopped"
+    assert there() == {False} and [part.id for part in ada.parts()] == ["text-1"]
+    assert _codes(lambda: makers.begin(ada, "good")) == "unspoken"
+
+
+def test_a_full_disk_keeps_nobody_from_stopping(people, makers, monkeypatch):
+    def full(*_):
+        raise StorageError("the disk is full.")
+
+    ada = people.person("Ada")
+    makers.begin(ada, "good")
+    _until(_began(ada).exists)
+    process = makers._running["Ada"]
+    monkeypatch.setattr(room, "write_progress", full)
+    makers.stop(ada)
+    people.delete("Ada")
+    assert process.poll() is not None and people.names() == ["Ida"]
+
+
+def test_a_log_that_leads_elsewhere_is_not_written(people, makers, tmp_path):
+    ada, elsewhere = people.person("Ada"), tmp_path / "elsewhere"
+    log = Places(ada.folder).folder / "log.txt"
+    log.parent.mkdir()
+    elsewhere.touch()
+    log.symlink_to(elsewhere)
+    makers.begin(ada, "quick")
+    _until(lambda: makers.progress(ada).state != "running")
+    assert log.is_file() and not log.is_symlink()
+    log.unlink()
+    os.mkfifo(log)
+    makers.begin(ada, "quick")
+    assert log.is_file()
 
 
 def test_a_server_that_comes_back_goes_on(people, makers):

@@ -16,6 +16,7 @@ from ico3d.recording.making.progress import (
     read_progress,
     write_progress,
 )
+from support.not_ours import replacements
 
 ADVICE = (Advice("blur", spans=((2, 3),)), Advice("face-none", "refused"))
 BLUR = {"code": "blur", "level": "better", "values": {}, "spans": [[2, 3]], "detail": ""}
@@ -89,3 +90,11 @@ def test_what_goes_on_keeps_its_pictures_and_of_what_it_is_made(tmp_path):
     write_progress(tmp_path, before)
     assert begun(tmp_path, "good") == Progress("running", "good", faces=3, made_of={"on": ["demo"]})
     assert begun(tmp_path, "good", {"on": []}).made_of == {"on": []}
+
+
+def test_what_lies_elsewhere_is_no_progress(tmp_path):
+    progress = Progress("made", "quick")
+    write_progress(tmp_path, progress)
+    for _ in replacements(tmp_path / "progress.json"):
+        assert read_progress(tmp_path) is None
+    assert read_progress(tmp_path) == progress

@@ -100,9 +100,13 @@ def test_the_same_parts_go_on_and_other_parts_begin_anew(person, asked, tmp_path
 
 
 def test_a_video_that_was_brought_takes_the_place_of_the_parts(person, asked, tmp_path):
-    _recorded(person, tmp_path, "consent", "text-1", "upload")
+    _recorded(person, tmp_path, "consent", "text-1")
     worker.make(person, "quick")
-    assert asked[0].video == person.folder / "parts" / "upload.mp4"
+    assert Places(person.folder).joined.is_file()
+    _recorded(person, tmp_path, "upload")
+    worker.make(person, "quick")
+    assert asked[1].video == person.folder / "parts" / "upload.mp4"
+    assert not Places(person.folder).joined.exists()  # parts leave nothing when they are deleted
 
 
 def test_an_error_is_one_sentence_and_an_earlier_avatar_stays(person, asked, tmp_path, monkeypatch):

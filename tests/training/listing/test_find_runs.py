@@ -7,13 +7,16 @@ import time
 
 import pytest
 
-from ico3d.cli import main
+from ico3d.cli import VERBS, main
 from ico3d.errors import StorageError
+from ico3d.training.checkpoint import save_sealed
+from ico3d.training.listing import find_runs as find
 from ico3d.training.listing.command import lines
 from ico3d.training.listing.find_runs import find_runs
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.notes.state import carried_out, note
 from ico3d.training.run import BEFORE, CHECKPOINT, RunFolder
+from support.nested import nested
 from training.walk import Walk
 
 LOOP = LoopSettings(steps=20, log_every=5, checkpoint_every=4)
@@ -199,13 +202,69 @@ def test_another_program_is_no_command_to_go_on_with(tmp_path):
     assert found(tmp_path)["a"] == ("head", 0, 20, "interrupted", "", "")
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "ico3d forget captures/me --yes",
+        "ico3d serve demo --port 8661 --settings talk.toml",
+        "ico3d studio recordings",
+        "ico3d train",
+        "ico3d train speech out",
+        "ico3d train body a b --ray evil:10001",
+        "ico3d train body a b --ray=evil:10001",
+        "ico3d train body a b --ray",
+        "ico3d evaluate a b --openface ./x",
+    ],
+)
+def test_what_does_more_than_train_is_no_command_to_go_on_with(tmp_path, command):
+    notes_of(tmp_path / "a", command=command.split())
+    assert found(tmp_path)["a"][-1] == ""
+
+
+@pytest.mark.parametrize("verb", find.VERBS)
+def test_what_trains_is_offered(tmp_path, verb):
+    assert " ".join(verb) in VERBS
+    words = ["ico3d", *verb, "a", "b", "--ray", "auto"]
+    notes_of(tmp_path / "a", command=words)
+    assert found(tmp_path)["a"][-1] == f"cd / && {' '.join(words)}"
+
+
+def test_folders_nested_deep_are_looked_through(tmp_path):
+    notes_of(run := tmp_path / "a")
+    for _ in range(2 * find.WITHIN):  # runs within runs
+        notes_of(run := run / "r")
+    with nested(tmp_path), nested(run):
+        assert list(found(tmp_path)) == ["a"]
+
+
+def test_a_checkpoint_whose_step_is_no_number_is_damaged(tmp_path):
+    notes_of(tmp_path / "a")
+    save_sealed(tmp_path / "a" / CHECKPOINT, {}, {"step": "7", "seconds": 0.0, "trainee": {}})
+    kind, step, _, state, reason, _ = found(tmp_path)["a"]
+    assert (kind, step, state) == ("head", 0, "damaged") and "is no checkpoint" in reason
+    with (tmp_path / "a/settings.json").open() as others:  # as while somebody trains
+        fcntl.flock(others, fcntl.LOCK_EX)
+        (tmp_path / "a/metrics.jsonl").write_text('{"step": "7"}\n')
+        assert found(tmp_path)["a"][:4] == ("head", 0, 20, "running")
+
+
+def test_nobody_waits_for_a_pipe(tmp_path):
+    for name in ("lock", "metrics.jsonl", "state.json"):
+        (tmp_path / "a").mkdir(exist_ok=True)
+        os.mkfifo(tmp_path / "a" / name)
+    (tmp_path / "a/about.json").write_text('{"video": "me.mp4"}')
+    assert found(tmp_path)["a"][:4] == ("create", 0, None, "interrupted")
+
+
 def test_a_terminal_obeys_nothing_that_notes_say(tmp_path, capsys):
-    notes_of(tmp_path / "a", command=["ico3d", "train\x1b[8m"], failed="\x1b]0;x\x07\n\u202eno")
+    notes_of(
+        tmp_path / "a", command=["ico3d", "create", "a\x1b[8m"], failed="\x1b]0;x\x07\n\u202eno"
+    )
     assert main(["runs", str(tmp_path)]) == 0
     first, reason, command = capsys.readouterr().out.splitlines()
     assert first.startswith(f"{tmp_path}/a: head, step 0 of 20, failed")
     assert reason == r"  \x1b]0;x\x07\n\u202eno"
-    assert command.endswith(r"ico3d train\x1b[8m'") or command.endswith(r"ico3d 'train\x1b[8m'")
+    assert command.endswith(r"ico3d create 'a\x1b[8m'")
 
 
 @pytest.mark.parametrize("steps", ["1e400", "[" * 100_000])

@@ -6,7 +6,8 @@ from pathlib import Path
 from ico3d.avatar.forgetting.holdings import Holding
 
 ELSEWHERE = (
-    "copies of bundles that were served, given away or embedded, and what visitors' browsers kept",
+    "copies of bundles that were served, given away, embedded or packed into archives, and what "
+    "visitors' browsers kept",
     "films, pictures, reports and exported splats that were made of the person",
     "backups, the history of version control, and copies on other machines",
     "voices cloned from recordings that settings name (~/.cache/ico3d/voices)",
@@ -20,7 +21,7 @@ def belonging(holdings: Sequence[Holding], paths: Sequence[Path], names: Set[str
     Args:
         holdings: Everything in the project.
         paths: Recordings, models, bundles or folders that are named, absolute.
-        names: The person's names in small letters.
+        names: The person's names, as they are compared.
     """
     chosen = [one for one in holdings if any(map(one.lies_in, paths))]
     shown = [one.names for one in chosen if one.names]

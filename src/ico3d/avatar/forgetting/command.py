@@ -63,7 +63,8 @@ class Forget:
             console.print(printable(f"- {sentence}"))
 
     def _meant(self, project: Path) -> tuple[list[Path], set[str]]:
-        """The paths, absolute, and the names in small letters that are named."""
+        """The paths, absolute, and the names, as they are compared, that are named."""
+        from ico3d.common.people.stated import alike
         from ico3d.errors import SettingsError
 
         if not self.who:
@@ -74,7 +75,7 @@ class Forget:
             if not os.path.lexists(path):
                 if os.sep in word:
                     raise SettingsError(f"there is nothing at {word}.")
-                names.add(word.casefold())
+                names.add(alike(word.strip()))
             elif project not in path.parents:
                 raise SettingsError(f"{word} does not lie below {project}: name it by --project.")
             else:

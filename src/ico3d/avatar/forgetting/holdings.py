@@ -1,6 +1,5 @@
 """What a project folder holds of people: recordings, models, runs, bundles, and whose they are."""
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +8,8 @@ from ico3d.avatar.models import KINDS
 from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST, Manifest
-from ico3d.common.files import read_object
-from ico3d.common.people.stated import BETWEEN, NOBODY, is_stated
+from ico3d.common.files import read_object, walk
+from ico3d.common.people.stated import BETWEEN, NOBODY, alike, is_stated
 from ico3d.errors import Ico3dError
 
 RUN = "settings.json"
@@ -30,6 +29,10 @@ RECORDINGS = {
 
 Files of data sets lie among others', and are named by their paths.
 """
+WORK, ABOUT = ".work", "about.json"
+"""Suffix and mark of folders in which `ico3d create` makes avatars, each beside its bundle."""
+BUNDLE, ZIP = ".ico3d", b"PK\3\4"
+"""How names of bundles end, and how their content begins under whichever name."""
 MODELS = tuple(kind.file for kind in KINDS if kind.model is not Bundle)
 
 
@@ -53,8 +56,8 @@ class Holding:
 
     @property
     def names(self) -> set[str]:
-        """The people whom it shows, in small letters; of synthetic people nobody."""
-        return {name.casefold() for name in self.likenesses if name != NOBODY}
+        """The people whom it shows, as names are compared; of synthetic people nobody."""
+        return {alike(name) for name in self.likenesses if name != NOBODY}
 
     def lies_in(self, path: Path) -> bool:
         """Whether it is a path, or below it."""
@@ -71,16 +74,15 @@ def find_holdings(project: Path) -> list[Holding]:
 
 
 def _walk(project: Path) -> Iterator[Holding]:
-    for place, folders, files in os.walk(project):
+    for folder, folders, files in walk(project):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        folder = Path(place)
         linked = (folder / name for name in folders if (folder / name).is_symlink())
         for candidate in (folder, *linked):
             if candidate != project and (found := _folder(candidate)) is not None:
                 yield found
-        for name in sorted(files):
-            if name.endswith(".ico3d"):
-                yield _bundle(folder / name)
+        for file in (folder / name for name in sorted(files)):
+            if (found := _file(file)) is not None:
+                yield found
 
 
 def _folder(folder: Path) -> Holding | None:
@@ -90,6 +92,8 @@ def _folder(folder: Path) -> Holding | None:
         return _recording(folder, about)
     if (folder / MANIFEST).is_file():
         return _bundle(folder)
+    if (folder / ABOUT).is_file() and (found := _workplace(folder)) is not None:
+        return found
     run, models = read_object(folder / RUN), [read_object(folder / name) for name in MODELS]
     if not any(models) and "capture" not in run:
         return None
@@ -101,6 +105,14 @@ def _folder(folder: Path) -> Holding | None:
     return Holding(folder, what, _named(*map(str, names)), tuple(made_of))
 
 
+def _workplace(folder: Path) -> Holding | None:
+    """A folder of `ico3d create`, with pictures of whom the avatar is named after."""
+    named = folder.suffix == WORK
+    if not named and not read_object(folder / ABOUT).keys() >= {"video", "sha256"}:
+        return None
+    return Holding(folder, "a workplace", _named(folder.stem) if named else ())
+
+
 def _recording(folder: Path, file: str) -> Holding:
     known = read_object(folder / file)
     about = known.get("provenance", known)
@@ -110,6 +122,22 @@ def _recording(folder: Path, file: str) -> Holding:
     likeness = NOBODY if file == "capture.json" else str(about.get("likeness", ""))
     what = "a cloned voice" if file == VOICE else "a recording"
     return Holding(folder, what, _named(likeness), (), sources)
+
+
+def _file(file: Path) -> Holding | None:
+    """What a file is; None where it is no bundle, by its name or by its content."""
+    if file.suffix.casefold() == BUNDLE:
+        return _bundle(file)
+    try:
+        if not file.is_file():
+            return None
+        with file.open("rb", buffering=0) as opened:
+            if opened.read(len(ZIP)) != ZIP:
+                return None
+        Manifest.from_json(open_archive(file).read(MANIFEST))
+    except (OSError, Ico3dError, KeyError):
+        return None
+    return _bundle(file)
 
 
 def _bundle(path: Path) -> Holding:

@@ -1,11 +1,11 @@
 """Removes files and folders, and says what that could not reach."""
 
-import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 from ico3d.capture.headpose.track_file import track_file as head_track_file
+from ico3d.common.files import walk
 from ico3d.errors import SettingsError
 from ico3d.rig.body_track import track_file as body_track_file
 
@@ -70,7 +70,7 @@ def _remove_folder(folder: Path) -> None:
 def _links_in(folder: Path) -> list[str]:
     """A sentence for each link below a folder, on what it leads to."""
     found = []
-    for place, folders, files in os.walk(folder):
-        links = (Path(place, name) for name in (*folders, *files))
+    for place, folders, files in walk(folder):
+        links = (place / name for name in (*folders, *files))
         found += [f"{one.resolve()}, to which {one} led" for one in links if one.is_symlink()]
     return found

@@ -1,7 +1,7 @@
 """Helpers for writing multiview folders."""
 
+import secrets
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,10 +22,10 @@ def new_folder(out: Path) -> Iterator[Path]:
     if out.exists():
         raise CaptureError(f"{out} exists already: remove it or choose another folder.")
     out.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    work = out.with_name(f".{out.name}.{secrets.token_hex(4)}")
+    work.mkdir()  # not mkdtemp: who may read it is for the umask to say
     try:
         yield work
-        work.chmod(0o755)
         work.rename(out)
     finally:
         shutil.rmtree(work, ignore_errors=True)

@@ -1,7 +1,5 @@
 """Tracks a video of somebody talking and writes a capture in the talking-portrait layout."""
 
-import shutil
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +13,7 @@ from ico3d.capture.face.mediapipe_face import (
     CanonicalFace,
     canonical_face,
 )
+from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait import cutout, parsing, rigid_head
 from ico3d.capture.portrait.details import notes_of, reprojection_error, save_details
 from ico3d.capture.portrait.exposure import even_out
@@ -61,14 +60,8 @@ def track_portrait(
         from ico3d.splat.device import computing_device
 
         computing_device(settings.device)  # better known now than after the tracking
-    out.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    try:
+    with new_folder(out) as work:
         _write(work, opened, model, settings, reached)
-        work.chmod(0o755)
-        work.rename(out)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
     console.print(f"[green]capture written to {out}[/]; look at it: ico3d capture check {out}")
 
 

@@ -1,5 +1,7 @@
 """Which statements about a recorded person were made: whose likeness, consent, licence."""
 
+import unicodedata
+
 NOT_STATED = "not stated"
 NOBODY = "nobody: no such person exists"
 """Whose likeness a synthetic person is."""
@@ -10,3 +12,8 @@ BETWEEN = "; "
 def is_stated(text: str) -> bool:
     """Whether something was said; of several recordings, of each of them."""
     return all(part.strip() not in ("", NOT_STATED) for part in text.split(BETWEEN))
+
+
+def alike(name: str) -> str:
+    """A name as names are compared: in whichever case and form of Unicode they are written."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())

@@ -87,8 +87,6 @@ class People:
             raise Refused("language", f"there are no texts in the language {language[:10]!r}.")
         if not agreed:
             raise Refused("consent", "nothing is recorded of anybody who did not agree.", 403)
-        if (self.folder / name).exists():
-            raise Refused("taken", f"there are recordings of {name} already.", 409)
         if len(self.names()) >= MOST:
             raise Refused("many", "there are recordings of 100 people: delete some of them.", 409)
         self.check_room()
@@ -99,8 +97,17 @@ class People:
         if voice:
             stated[VOICE_CONSENT] = f"{how}“{script.voice}”"
         text = json.dumps(stated, indent=1, ensure_ascii=False)
-        write_atomic(self.folder / name / CONSENT_FILE, text.encode())
-        return Person(self.folder / name)
+        folder = self.folder / name
+        try:
+            folder.mkdir()
+        except FileExistsError as error:  # also if somebody else begins just now
+            raise Refused("taken", f"there are recordings of {name} already.", 409) from error
+        try:
+            write_atomic(folder / CONSENT_FILE, text.encode())
+        except BaseException:
+            folder.rmdir()  # or nobody could begin again
+            raise
+        return Person(folder)
 
     def check_room(self) -> None:
         """Refuses to write where the disk is nearly full.

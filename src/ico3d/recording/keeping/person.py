@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.typed import parse_json
 from ico3d.recording.keeping.containers import HEAD, suffix_of
 from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD, scripts
@@ -65,7 +65,8 @@ class Person:
             Refused: If the file is damaged.
         """
         try:
-            about = parse_json((self.folder / CONSENT_FILE).read_bytes(), CONSENT_FILE, ValueError)
+            data = read_small(self.folder / CONSENT_FILE, links=False)
+            about = parse_json(data, CONSENT_FILE, ValueError)
             said = [about.get(entry, "") for entry in ("language", "consent", VOICE_CONSENT)]
             if all(isinstance(one, str) for one in said) and said[0] in scripts():
                 return about
@@ -198,7 +199,8 @@ class Person:
 
     def _files(self, pattern: str) -> Iterator[Path]:
         """Files of the parts; what a link leads to may be anything of this machine."""
-        return (file for file in self._parts.glob(pattern) if not file.is_symlink())
+        found = self._parts.glob(pattern)
+        return (file for file in found if file.is_file() and not file.is_symlink())
 
     def _make_room(self, id: str) -> None:
         for old in self._takes(id)[: -(MOST_TAKES - 1)]:
@@ -206,7 +208,8 @@ class Person:
 
     def _report(self, id: str) -> dict[str, Any]:
         try:
-            found = parse_json((self._parts / f"{id}.json").read_bytes(), id, ValueError)
+            data = read_small(self._parts / f"{id}.json", links=False)
+            found = parse_json(data, id, ValueError)
             return {name: found[name] for name in UNSEEN}
         except (OSError, ValueError, TypeError, KeyError):
             return dict(UNSEEN)

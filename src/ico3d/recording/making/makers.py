@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any, cast
 
 from ico3d.bundle.packaged import NAME
+from ico3d.common.files import remove_unfinished
 from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.errors import StorageError
 from ico3d.failures import FAILURES
 from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice
 from ico3d.recording.keeping.people import People
-from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.person import Person, checked_id
+from ico3d.recording.keeping.plan import CONSENT
 from ico3d.recording.making.beside import FULL_DISK, start, stop
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, begun, read_progress, write_progress
@@ -118,7 +120,10 @@ class Makers:
             folder.mkdir(exist_ok=True)
             of = self._made_of(person)
             write_progress(folder, begun(folder, cast(QualityName, quality), of))
-            with (folder / LOG).open("ab") as log:
+            log_file = folder / LOG
+            if log_file.is_symlink() or not log_file.is_file():  # nothing of ours
+                log_file.unlink(missing_ok=True)
+            with log_file.open("ab") as log:
                 words = [str(person.folder), quality, *of["on"]]
                 self._running[person.name] = start(self._worker, words, log)
 
@@ -151,13 +156,38 @@ class Makers:
         folder = Places(person.folder).folder
         found = read_progress(folder)
         if found is not None and found.state == "running":
-            write_progress(folder, replace(found, state="stopped", left=None))
+            with contextlib.suppress(StorageError):  # what is stopped may be deleted, to make room
+                write_progress(folder, replace(found, state="stopped", left=None))
 
     def discard(self, person: Person) -> None:
         """Removes what was made so far; recordings and a finished avatar stay."""
         with self._lock:
             self._stop(person)
             shutil.rmtree(Places(person.folder).folder, ignore_errors=True)
+
+    def withdraw(self, person: Person, id: str) -> None:
+        """Removes a part with all that was made of it on the way; a finished avatar stays.
+
+        A making that needs it is stopped, and begins anew when somebody asks: without the consent,
+        any making.
+
+        Args:
+            person: Whose.
+            id: The part.
+
+        Raises:
+            Refused: If there is no such part.
+        """
+        places, id = Places(person.folder), checked_id(id)
+        with self._lock:
+            found = read_progress(places.folder)
+            if found is not None and (id == CONSENT or found.is_of(id)):
+                self._stop(person)
+                remove_unfinished(places.folder)
+                shutil.rmtree(places.work, ignore_errors=True)
+                for file in (places.joined, places.joined_of, places.made):
+                    file.unlink(missing_ok=True)
+            person.remove(id)
 
     def changed(self, person: Person, progress: Progress) -> list[str]:
         """What is another since a making began: `parts`, `on` (the body), both or nothing."""

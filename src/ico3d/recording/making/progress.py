@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from PIL import Image
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.typed import parse_json, plain
 from ico3d.creating.events import Advanced, Event, Looked, Made, Planned, Preview, Step, Voiced
 from ico3d.creating.looking.advice import Advice, Level
@@ -56,11 +56,20 @@ class Progress:
     decibels: float | None = None
     made_of: dict[str, Any] = field(default_factory=dict)
 
+    def is_of(self, id: str) -> bool:
+        """Whether the avatar is made of a part; also where it is not known of which."""
+        parts = self.made_of.get("parts")
+        if not isinstance(parts, list):
+            return True
+        names = [str(one[0]) for one in parts if isinstance(one, list) and one]
+        return any(name.partition(".")[0] == id for name in names)
+
 
 def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""
     try:
-        found = Progress(**parse_json((folder / FILE).read_bytes(), FILE, ValueError))
+        data = read_small(folder / FILE, links=False)
+        found = Progress(**parse_json(data, FILE, ValueError))
         of = dict(found.made_of)
         return replace(found, advice=tuple(found.advice), refused=tuple(found.refused), made_of=of)
     except (OSError, ValueError, TypeError, KeyError):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ico3d.avatar.embodying.look import UNCHANGED, Look
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError, printable
@@ -96,6 +96,7 @@ def _video(person: Person, places: Places) -> Path:
     if _before(places) != now or not video.is_file():
         shutil.rmtree(places.work, ignore_errors=True)
         places.made.unlink(missing_ok=True)
+        places.joined.unlink(missing_ok=True)
         if video == places.joined:
             join(files, video)
         write_atomic(places.joined_of, json.dumps(now).encode())
@@ -104,8 +105,8 @@ def _video(person: Person, places: Places) -> Path:
 
 def _before(places: Places) -> list | None:
     try:
-        return json.loads(places.joined_of.read_text("utf-8"))
-    except (OSError, ValueError):
+        return json.loads(read_small(places.joined_of, links=False).decode("utf-8"))
+    except (OSError, ValueError, RecursionError):
         return None
 
 

@@ -5,10 +5,11 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from ico3d.common.files import read_object
+from ico3d.common.files import read_object, walk
 from ico3d.errors import ModelError
 from ico3d.training.log import METRICS, latest_entry
 from ico3d.training.notes.lock import is_locked
@@ -28,6 +29,25 @@ KINDS = {
 LOST = "No other checkpoint can be used: put a copy there, or move it away to begin afresh."
 PROGRAM = "ico3d"
 """The only program that a run is said to go on by."""
+VERBS = tuple(
+    tuple(verb.split())
+    for verb in (
+        "create",
+        "train head",
+        "train static",
+        "train body",
+        "assemble",
+        "measure portrait",
+        "measure body",
+        "measure ablations",
+        "measure all",
+    )
+)
+"""What it does then: these train, and note it. Others remove, serve, or start programs."""
+RAY = "--ray"
+"""Option that names a cluster, whose machines may run programs here: never one of strangers."""
+WITHIN = 50
+"""Runs of which each lies within the one before; what is deeper counts as within the last."""
 State = Literal["finished", "running", "interrupted", "failed", "damaged"]
 
 
@@ -180,7 +200,7 @@ def _judged(node: _Node) -> tuple[State, str]:
 def _command(node: _Node) -> str:
     """The command by which a run goes on, where it now is."""
     state, now = node.state, str(node.path.resolve())
-    if state.command[:1] != (PROGRAM,):  # whoever wrote the notes may want another one run
+    if not _is_training(state.command):  # whoever wrote the notes may want something else run
         return ""
     words = list(state.command)
     if now != state.path:
@@ -191,14 +211,23 @@ def _command(node: _Node) -> str:
     return command if here else f"cd {shlex.quote(state.folder)} && {command}"
 
 
+def _is_training(command: tuple[str, ...]) -> bool:
+    """Whether a command does nothing but train."""
+    if not any(command[: 1 + len(verb)] == (PROGRAM, *verb) for verb in VERBS):
+        return False
+    clusters = [after for word, after in pairwise((*command, "")) if word == RAY]
+    clusters += [word.partition("=")[2] for word in command if word.startswith(f"{RAY}=")]
+    return all(one == "auto" for one in clusters)
+
+
 def _extent(folder: Path) -> tuple[int, float]:
     """Bytes of all files in a folder and below it, and when one of them was written last."""
     size, changed = 0, 0.0
-    for place, _, files in os.walk(folder):
+    for place, _, files in walk(folder):
         for name in files:
             try:
-                found = os.lstat(os.path.join(place, name))
-            except FileNotFoundError:  # replaced in the meantime
+                found = (place / name).lstat()
+            except OSError:  # replaced in the meantime
                 continue
             size += found.st_size
             changed = max(changed, found.st_mtime)
@@ -207,17 +236,17 @@ def _extent(folder: Path) -> tuple[int, float]:
 
 def _nodes(folder: Path) -> list[_Node]:
     """The outermost runs in a folder, itself among them, each with those within it."""
-    try:
-        entries = [one for one in os.scandir(folder) if one.is_dir(follow_symlinks=False)]
-    except OSError:  # not ours to read
-        return []
-    inside = sorted(Path(one.path) for one in entries if not one.name.startswith("."))
-    below = [node for path in inside for node in _nodes(path)]
-    own = _node(folder)
-    if own is None:
-        return below
-    own.parts = below
-    return [own]
+    found: list[_Node] = []
+    around: list[_Node] = []  # from the outermost to the innermost in which the next one may lie
+    for place, folders, _ in walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        node = _node(place)
+        if node is None:
+            continue
+        around = [one for one in around if node.path.is_relative_to(one.path)]
+        (around[-1].parts if around else found).append(node)
+        around = [*around, node][:WITHIN]
+    return found
 
 
 def _node(folder: Path) -> _Node | None:

@@ -106,6 +106,8 @@ def lets_go(train: Callable[P, T]) -> Callable[P, T]:
 
 def is_locked(file: Path) -> bool:
     """Whether a process holds the lock of a file; False where there is no such file."""
+    if not file.is_file():  # nobody opens a pipe on the other side
+        return False
     try:
         with file.open("rb") as opened:
             fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
