@@ -80,6 +80,17 @@ def test_a_window_of_something_else_is_refused(tmp_path):
         load_window(tmp_path / "w.safetensors")
 
 
+@pytest.mark.parametrize("named", ["1.safetensors", "./other.safetensors"])
+def test_each_window_has_a_file_of_its_own(body, tmp_path, named):
+    """Else a short list would fill the memory with one file."""
+    (tmp_path / "other.safetensors").symlink_to("1.safetensors")
+    about = json.loads((tmp_path / ABOUT).read_text())
+    about["windows"][0]["file"] = named
+    (tmp_path / ABOUT).write_text(json.dumps(about))
+    with pytest.raises(ModelError, match="names a file for more than one window"):
+        TrainedBody.load(tmp_path)
+
+
 @pytest.mark.parametrize("named", ["a" * 5000, "\0", "\ud800", 1])
 def test_names_that_no_file_can_have(body, tmp_path, named):
     about = json.loads((tmp_path / ABOUT).read_text())

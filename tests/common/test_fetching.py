@@ -1,5 +1,6 @@
 """Downloads from a server on this machine: whole, damaged, interrupted."""
 
+import contextlib
 import hashlib
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -9,7 +10,8 @@ import pytest
 from ico3d.cli import main
 from ico3d.common.catalogue import table as room
 from ico3d.common.catalogue.kinds import RemoteFile, Weights
-from ico3d.common.downloads.fetching import fetch_file, git_blob
+from ico3d.common.downloads import fetching
+from ico3d.common.downloads.fetching import git_blob
 from ico3d.errors import DownloadError
 
 pytestmark = pytest.mark.slow
@@ -18,12 +20,17 @@ DATA = b"\x08" + hashlib.shake_256(b"weights").digest(300_000)
 SHA256 = hashlib.sha256(DATA).hexdigest()
 
 
+def fetch_file(file, folder, most=1 << 20):
+    return fetching.fetch_file(file, folder, most)
+
+
 class Host(ThreadingHTTPServer):
     """Serves DATA; may hang up early or ignore ranges."""
 
     def __init__(self):
         super().__init__(("127.0.0.1", 0), Handler)
         self.sends, self.ranges, self.asked = len(DATA), True, []
+        self.headers: dict[str, str] = {}
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -39,8 +46,14 @@ class Handler(BaseHTTPRequestHandler):
             self.send_error(416)
             return
         self.send_response(206 if first else 200)
-        self.send_header("Content-Length", str(len(body) - first))
+        headers = {"Content-Length": str(len(body) - first)} | self.server.headers
+        for name, value in headers.items():
+            self.send_header(name, value)
         self.end_headers()
+        if "endless" in self.path:
+            with contextlib.suppress(OSError):
+                while True:
+                    self.wfile.write(DATA)
         self.wfile.write(body[first : self.server.sends])
 
     def log_message(self, *_):
@@ -95,6 +108,49 @@ def test_another_file_is_refused_and_removed(host, tmp_path, name, checksum, say
     with pytest.raises(DownloadError, match=says):
         fetch_file(RemoteFile("b.onnx", url(host, name), checksum), tmp_path)
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "length", "most"),
+    [
+        ("a.onnx", str(10**30), len(DATA) - 1),
+        ("a.onnx", "300001", len(DATA) - 1),
+        ("endless.onnx", "", 600_000),
+        ("endless.onnx", "a lot", 600_000),
+    ],
+)
+@pytest.mark.parametrize("have", [0, 9])
+def test_a_server_sends_no_more_than_a_file_has(host, tmp_path, name, length, most, have):
+    (tmp_path / f".{name}.part").write_bytes(DATA[:have])
+    host.headers, host.ranges = {"Content-Length": length}, have > 0
+    with pytest.raises(DownloadError, match=rf"more than {most:,} bytes\): it was deleted"):
+        fetch_file(RemoteFile("b.onnx", url(host, name), SHA256), tmp_path, most)
+    assert names(tmp_path) == []
+
+
+def test_a_part_that_is_larger_than_the_file_is_removed(host, tmp_path):
+    (tmp_path / ".a.onnx.part").write_bytes(bytes(len(DATA) - 1))
+    with pytest.raises(DownloadError, match="it was deleted"):
+        fetch_file(RemoteFile("b.onnx", url(host), SHA256), tmp_path, len(DATA) - 2)
+    assert names(tmp_path) == []
+
+
+def test_what_is_sent_packed_is_refused(host, tmp_path):
+    host.headers = {"Content-Encoding": "gzip"}
+    with pytest.raises(DownloadError, match=r"is sent packed \(gzip\)"):
+        fetch_file(RemoteFile("b.onnx", url(host)), tmp_path)
+    assert names(tmp_path) == []
+
+
+def test_the_catalogue_bounds_what_its_files_are(host, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("ICO3D_MODELS", raising=False)
+    host.headers = {"Content-Length": ""}
+    file = RemoteFile("b.onnx", url(host, "endless.onnx"), SHA256)
+    one = Weights("one", "a test", 3, "MIT", (file,))
+    monkeypatch.setitem(room.TABLE, "one", one)
+    with pytest.raises(DownloadError, match="more than 1,048,582 bytes"):
+        fetching.fetch(one)
 
 
 @pytest.mark.parametrize("ranges", [True, False])

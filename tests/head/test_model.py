@@ -7,8 +7,10 @@ import torch
 
 from ico3d.errors import ModelError
 from ico3d.head.model import HeadModel
+from ico3d.head.model_folder import TrainedHead
+from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat import harmonics
-from ico3d.training.checkpoint import save_tensors
+from ico3d.training.checkpoint import load_tensors, save_tensors
 from support.heads.shapes import head_shape
 
 VARIANTS = ("full", "no-mlp", "no-blending", "static")
@@ -138,6 +140,37 @@ def test_a_file_of_something_else_is_one_sentence(tmp_path):
     save_tensors(tmp_path / "x.safetensors", {"a": torch.zeros(1)}, {"shape": {"nonsense": 1}})
     with pytest.raises(ModelError, match="does not hold a head model"):
         HeadModel.load(tmp_path / "x.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "named"),
+    [
+        ("hidden", 10**8, "color_branch"),
+        ("features", 10**9, "basis"),
+        ("expression_size", 10**9, "basis"),
+    ],
+)
+def test_what_a_file_describes_is_compared_before_it_is_built(tmp_path, field, value, named):
+    file = tmp_path / "model.safetensors"
+    HeadModel(head_shape(2, features=4, hidden=3, frequencies=1), 3).save(file)
+    tensors, state = load_tensors(file)
+    save_tensors(file, tensors, {"shape": state["shape"] | {field: value}})
+    with pytest.raises(ModelError, match=rf"does not hold a head model: .*'{named}.* expected"):
+        HeadModel.load(file)
+
+
+@pytest.mark.parametrize(
+    ("size", "vectors"), [(10**8, 1), (10**8, 10**8), (64, 65), (64, 0), (-1, -1)]
+)
+def test_an_adaptor_for_features_that_no_encoder_gives_is_not_built(tmp_path, size, vectors):
+    adaptor = SpeechAdaptor(64)
+    model = HeadModel(head_shape(39), 4)
+    TrainedHead(model, "speech", (), "builtin", "", adaptor, {}).save(tmp_path)
+    file = tmp_path / "adaptor.safetensors"
+    tensors, _ = load_tensors(file)
+    save_tensors(file, tensors, {"features": size, "vectors": vectors})
+    with pytest.raises(ModelError, match=f"no speech encoder gives {size} features in {vectors}"):
+        TrainedHead.load(tmp_path)
 
 
 def test_harmonics_follow_a_change_of_light():

@@ -147,7 +147,8 @@ class TrainedBody:
             entries = content["windows"]
             windows = tuple(Window(int(e["first"]), int(e["last"])) for e in entries)
             files = [folder / str(entry["file"]) for entry in entries]
-            inside = [file.resolve().is_relative_to(folder.resolve()) for file in files]
+            found = [file.resolve() for file in files]
+            inside = [file.is_relative_to(folder.resolve()) for file in found]
             fps, method = float(content["fps"]), content["method"]
             summary = content["summary"]
         except DAMAGED as error:
@@ -157,4 +158,6 @@ class TrainedBody:
         if not all(inside):
             file = files[inside.index(False)]
             raise ModelError(f"{folder / about} names a file outside of its folder: {file}.")
+        if len(set(found)) < len(found):
+            raise ModelError(f"{folder / about} names a file for more than one window.")
         return cls([load_window(file) for file in files], windows, fps, method, summary)

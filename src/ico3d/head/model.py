@@ -16,7 +16,7 @@ from ico3d.head.blending.basis import blend
 from ico3d.head.portrait.neck import Neck
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
-from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, check_shapes, load_tensors, save_tensors
 
 Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
@@ -281,7 +281,9 @@ class HeadModel(nn.Module):
                 fields["neck"] = Neck(
                     **fields["neck"] | {"middle": tuple(fields["neck"]["middle"])}
                 )
-            model = cls(HeadShape(**fields), tensors["means"].shape[0])
+            shape, count = HeadShape(**fields), tensors["means"].shape[0]
+            check_shapes(lambda: cls(shape, count), tensors)
+            model = cls(shape, count)
             model.load_state_dict(tensors)
         except DAMAGED as error:
             raise ModelError(

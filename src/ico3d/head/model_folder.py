@@ -29,6 +29,8 @@ ABOUT = "head.json"
 """Name of the file that marks a folder as one of a head."""
 SILENCE = 2
 """Seconds of silent sound, long enough that the middle is free of effects of the ends."""
+MOST_FEATURES = 8192
+"""Largest number of features per row that is believed; HuBERT has 2048."""
 Inputs = Literal["speech", "blendshapes"]
 
 
@@ -214,7 +216,10 @@ def _turn(values: dict | None) -> TurnRange | None:
 def _load_adaptor(path: Path) -> SpeechAdaptor:
     tensors, state = load_tensors(path)
     try:
-        adaptor = SpeechAdaptor(int(state["features"]), int(state.get("vectors", 1)))
+        size, vectors = int(state["features"]), int(state.get("vectors", 1))
+        if not 1 <= vectors <= size <= MOST_FEATURES:
+            raise ValueError(f"no speech encoder gives {size} features in {vectors} vectors")
+        adaptor = SpeechAdaptor(size, vectors)
         adaptor.restore(tensors)
     except DAMAGED as error:
         raise ModelError(f"{path} does not hold a speech adaptor ({error}).") from error

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 import torch
 from safetensors import SafetensorError, safe_open
-from torch import Tensor
+from torch import Tensor, nn
 
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
@@ -171,6 +171,28 @@ def load_state(path: Path) -> dict:
     """Reads only the state of a checkpoint, not its tensors; errors as for `load_tensors`."""
     with _opened(path) as file:
         return json.loads((file.metadata() or {})["state"])
+
+
+def check_shapes(build: Callable[[], nn.Module], tensors: Mapping[str, Tensor]) -> None:
+    """Compares the tensors of a file with those of a network, for which no memory is taken.
+
+    A file of a few bytes can describe a network of any size.
+
+    Args:
+        build: Makes the network that the file describes.
+        tensors: The tensors of the file.
+
+    Raises:
+        ValueError: If a tensor is missing, superfluous or of another shape.
+    """
+    with torch.device("meta"):
+        wanted = {name: tuple(value.shape) for name, value in build().state_dict().items()}
+    found = {name: tuple(value.shape) for name, value in tensors.items()}
+    for name in sorted(wanted.keys() | found.keys()):
+        if wanted.get(name) != found.get(name):
+            raise ValueError(
+                f"'{name}' has the shape {found.get(name)}, expected {wanted.get(name)}"
+            )
 
 
 @contextmanager

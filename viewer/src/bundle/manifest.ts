@@ -178,6 +178,7 @@ function checkBody(body: BodyInfo): void {
   if (!Array.isArray(body.windows) || body.windows.length === 0) bad('body.windows');
   body.windows.forEach((window, i) => {
     const { first, last, ranks } = window;
+    if (window.file !== windowFile(i)) bad(`body.windows[${i}].file`); // else any address could be asked for
     const begins = i ? body.windows[i - 1]!.last : 0;
     if (first !== begins || !Number.isInteger(last) || last <= first) bad(`body.windows[${i}]`);
     if (!isCount(window.num_gaussians, MAX_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
@@ -185,6 +186,11 @@ function checkBody(body: BodyInfo): void {
     const counted = isNumbers(ranks, 3) && ranks.every((rank) => isCount(rank, MOST_LAYERS));
     if (!counted || ranks[0] + ranks[1] + ranks[2] > MOST_LAYERS) bad(`body.windows[${i}].ranks`);
   });
+}
+
+/** Name of the file of a window of a body. */
+function windowFile(index: number): string {
+  return `body/${String(index).padStart(4, '0')}.safetensors`;
 }
 
 /** A head is carried by its body: it has a pose for each of the body's frames. */

@@ -26,11 +26,11 @@ const METADATA = '__metadata__';
  */
 export function parseSafetensors(buffer: ArrayBuffer, file: string): Map<string, Tensor> {
   const { header, length } = readHeader(buffer, file);
-  const tensors = new Map<string, Tensor>();
-  for (const [name, entry] of Object.entries(header)) {
-    if (name !== METADATA) tensors.set(name, readTensor(buffer, 8 + length, entry as Entry, `${file}: ${name}`));
-  }
-  return tensors;
+  const base = 8 + length;
+  const entries = Object.entries(header).filter(([name]) => name !== METADATA) as [string, Entry][];
+  for (const [name, entry] of entries) checkEntry(entry, buffer.byteLength - base, `${file}: ${name}`);
+  checkCover(entries.map(([, entry]) => entry.data_offsets), buffer.byteLength - base, file);
+  return new Map(entries.map(([name, entry]) => [name, readTensor(buffer, base, entry)]));
 }
 
 /**
@@ -60,14 +60,24 @@ function parseHeader(bytes: Uint8Array, file: string): Record<string, unknown> {
   }
 }
 
-function readTensor(buffer: ArrayBuffer, base: number, entry: Entry, where: string): Tensor {
-  const { dtype, shape, data_offsets: [begin, end] } = entry;
+function checkEntry({ dtype, shape, data_offsets: [begin, end] }: Entry, size: number, where: string): void {
   const itemSize = BYTES[dtype];
   if (itemSize === undefined) throw new PageError(`${where} has the unexpected type ${dtype}.`);
-  const count = shape.reduce((product, size) => product * size, 1);
-  if (end - begin !== count * itemSize || begin < 0 || base + end > buffer.byteLength) {
-    throw new PageError(`${where} does not fit its shape.`);
+  const count = shape.reduce((product, length) => product * length, 1);
+  if (end - begin !== count * itemSize || begin < 0 || end > size) throw new PageError(`${where} does not fit its shape.`);
+}
+
+/** Tensors must fill the file without gap or overlap: else a small file could hold any number of large ones. */
+function checkCover(spans: [number, number][], size: number, file: string): void {
+  let at = 0;
+  for (const [begin, end] of spans.toSorted((a, b) => a[0] - b[0] || a[1] - b[1])) {
+    if (begin !== at) throw new PageError(`${file}: its tensors overlap or leave a gap.`);
+    at = end;
   }
+  if (at !== size) throw new PageError(`${file} has bytes that belong to no tensor.`);
+}
+
+function readTensor(buffer: ArrayBuffer, base: number, { dtype, shape, data_offsets: [begin, end] }: Entry): Tensor {
   const bytes = buffer.slice(base + begin, base + end); // a copy is aligned whatever the header's length
   if (dtype === 'I8') return { dtype, shape, data: new Int8Array(bytes) };
   if (dtype === 'U8') return { dtype, shape, data: new Uint8Array(bytes) };

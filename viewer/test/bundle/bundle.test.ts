@@ -56,6 +56,10 @@ describe('a damaged bundle is refused in one sentence', () => {
     ['header cut', () => parseSafetensors(headFile.slice(0, 40), 'head'), /ends before its header/],
     ['no header', () => parseSafetensors(withHeader('{'), 'head'), /not JSON/],
     ['unknown type', () => parseSafetensors(withHeader(entry('F64', [1], 8), 8), 'head'), /F64/],
+    ['tensors in one place', () => parseSafetensors(withHeader(spans([0, 4], [0, 4]), 4), 'head'), /overlap or leave a gap/],
+    ['tensors that overlap', () => parseSafetensors(withHeader(spans([2, 6], [0, 4]), 6), 'head'), /overlap or leave a gap/],
+    ['a gap', () => parseSafetensors(withHeader(spans([0, 4], [5, 6]), 6), 'head'), /overlap or leave a gap/],
+    ['bytes of no tensor', () => parseSafetensors(withHeader(spans([0, 4]), 6), 'head'), /bytes that belong to no tensor/],
     ['other counts', () => readBakedHead(parseSafetensors(headFile, 'head'), { ...info, rank: 3 }, 'head'), /basis/],
     ['not finite', () => readBakedHead(spoiled(), info, 'head'), /means holds numbers that are not finite/],
     ['other format', () => checkManifest({ format: 'zip' }), /not that of an avatar bundle/],
@@ -69,6 +73,11 @@ describe('a damaged bundle is refused in one sentence', () => {
 
 function entry(dtype: string, shape: number[], size: number): string {
   return JSON.stringify({ x: { dtype, shape, data_offsets: [0, size] } });
+}
+
+/** Tensors of bytes. */
+function spans(...offsets: [number, number][]): string {
+  return JSON.stringify(Object.fromEntries(offsets.map(([begin, end], i) => [i, { dtype: 'U8', shape: [end - begin], data_offsets: [begin, end] }])));
 }
 
 function withHeader(header: string, dataSize = 0): ArrayBuffer {

@@ -57,6 +57,20 @@ describe('the rasteriser', () => {
     expect(worst(draw(frame(0, COLUMNS), small), draw(frame(0, COLUMNS)))).toBe(0);
   });
 
+  test('makes no room for what a Gaussian has outside of the picture', async () => {
+    const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
+    const [pictures, bytes] = [[] as Uint8Array[], [] as number[]];
+    for (const size of [10, Math.exp(9)]) {
+      const kernel = await makeKernel();
+      const one = new Rasteriser(kernel, 1000);
+      one.put(0, { kind: 'still', count: 1, rows: Float32Array.of(0, 0, 2, 1, 0, 0, 0, size, size, size, 0.5, 0.4, 0.3, 0.9, 0, 0).buffer, sizes: [] });
+      pictures.push(draw({ ...frame(0, COLUMNS), placed: [{ id: 0, view, drawn: 1, values: new Float32Array(0) }] }, one));
+      bytes.push(kernel.memory.buffer.byteLength);
+    }
+    expect(worst(pictures[1]!, pictures[0]!)).toBeLessThanOrEqual(1);
+    expect(bytes[1]).toBe(bytes[0]);
+  });
+
   test('keeps the pixels of tiles that did not change, and no others', async () => {
     const [keeping, fresh] = [new Rasteriser(await makeKernel()), new Rasteriser(await makeKernel())];
     for (const one of [keeping, fresh]) one.put(0, reference.source);

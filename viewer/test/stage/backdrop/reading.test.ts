@@ -106,7 +106,7 @@ describe('splats behind a person', () => {
       };
       return { writable, readable: readable.pipeThrough(new TransformStream({ transform })) };
     });
-    const bytes = spz(3, 1, [row], (all) => gzipSync(Buffer.concat([all, Buffer.alloc(32 << 20)])));
+    const bytes = spz(3, 1, [row], (all) => gzipSync(Buffer.concat([all, Buffer.alloc(16 << 20)])));
     await expect(rowsOf('background.spz', bytes)).rejects.toThrow('no splats that this page can read');
     vi.unstubAllGlobals();
     expect(unpacked).toBeLessThan(8 << 20);

@@ -21,8 +21,8 @@ COEFFICIENTS = 10
 """Number of coefficients of shape, and of expression, that recordings have."""
 EXPRESSIONS_FROM = {400: 300, 20: 10}
 """First expression among the directions of shape, by the least number of directions."""
-LARGEST = 2**30
-"""Largest size of an array in bytes; a damaged file can claim any number."""
+LARGEST = 2**28
+"""Largest size of all arrays in bytes, twice what SMPL-X has; a damaged file can claim any."""
 ABOUT_ONE = 1e-3
 """Largest deviation of the sum of a vertex's weights from 1, and of a weight below 0."""
 SHAPES = {
@@ -131,10 +131,11 @@ def _arrays(file: Path) -> dict[str, np.ndarray]:
         lacking = [name for name in SHAPES if f"{name}.npy" not in sizes]
         if lacking:
             raise _wrong(file, f"it lacks {', '.join(lacking)}")
-        if any(sizes[f"{name}.npy"] > LARGEST for name in SHAPES):
-            raise _wrong(file, "an array is larger than any of SMPL-X")
+        if sum(sizes[f"{name}.npy"] for name in SHAPES) > LARGEST:
+            raise _wrong(file, "its arrays are larger than those of SMPL-X")
         with np.load(file, allow_pickle=False) as content:
-            arrays = {name: np.asarray(content[name]) for name in SHAPES}
+            # By the whole names of what was measured: numpy prefers members that lack the ending.
+            arrays = {name: np.asarray(content[f"{name}.npy"]) for name in SHAPES}
     except FileNotFoundError as error:
         raise CaptureError(f"there is no SMPL-X model {file}.") from error
     except DAMAGED as error:
