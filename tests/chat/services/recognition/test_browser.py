@@ -133,7 +133,8 @@ def test_a_turn_holds_no_more_than_a_typed_question(results):
     taken = [room.take(heard.text) for heard in results]
     kept = [words for words in taken if words]
     assert len(kept) <= browser.MOST_RESULTS and len(" ".join(kept)) <= MAX_QUESTION
-    assert kept == [heard.text.strip()[: len(words)].strip() for heard, words in zip(results, kept)]
+    whole = [heard.text for heard in results[: len(kept)]]
+    assert kept == [text[: len(words)] for text, words in zip(whole, kept, strict=True)]
     assert room.fit("more") == "" or len(" ".join(kept)) < MAX_QUESTION - 1
     room.clear()
     assert room.take("what is") == "what is"
