@@ -240,6 +240,10 @@ class Conversation:
             raise ProtocolError("this server listens itself.")
         if isinstance(message, Deaf):
             logger.info(f"the browser does not recognise speech: {message.reason!r}")
+        elif not (self._allowance.is_begun or self._may_ask()):
+            return
+        else:
+            self._allowance.begin()
         await self._input.pass_on(message)  # to the BrowserRecognition
 
     def _may_ask(self) -> bool:

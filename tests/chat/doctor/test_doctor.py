@@ -1,13 +1,21 @@
 """`ico3d doctor`: finds what is wrong with a machine or a deployment, and says what helps."""
 
 import asyncio
+import contextlib
+import gzip
+import itertools
+import threading
+from datetime import UTC, datetime
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import httpx
 import pytest
+from websockets.asyncio.server import serve
 
-from ico3d.chat.doctor import deployment, machine, visit
+from ico3d.chat.doctor import deployment, fetching, machine, visit
 from ico3d.chat.doctor.deployment import Place
+from ico3d.chat.serving.network.certificates import own_certificate
 from ico3d.chat.serving.sites import Sites
 from ico3d.cli import main
 from ico3d.errors import SettingsError
@@ -101,3 +109,79 @@ def test_a_port_that_is_taken():
         listener.listen()
         assert machine.of_port(listener.getsockname()[1]).grade == "weak"
     assert machine.of_port(free_port()).grade == "good"
+
+
+@contextlib.contextmanager
+def answering(headers, pieces):
+    """The address of a server that answers so to everything."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            for name, value in headers.items():
+                self.send_header(name, value)
+            self.end_headers()
+            with contextlib.suppress(OSError):
+                for piece in pieces:
+                    self.wfile.write(piece)
+
+        def log_message(self, *_):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+@pytest.mark.parametrize("secure", [True, False])
+async def test_a_key_is_sent_to_nobody_who_may_be_somebody_else(
+    bundle, tmp_path, monkeypatch, secure
+):
+    key, asked = "a key that nobody guesses", []
+    monkeypatch.setattr(deployment, "LOOPBACK", frozenset())
+    monkeypatch.setattr(deployment, "token_for", lambda *given: asked.append(given))
+    certificate = own_certificate(tmp_path, ["127.0.0.1"], datetime.now(UTC)) if secure else None
+    async with serving(bundle, TYPED, sites=Sites(key=key), certificate=certificate) as (url, _):
+        found = await looked_at(url, key)
+    assert not asked
+    (said,) = [one for one in told(found, "weak") if one.startswith("the key was not sent")]
+    assert ("somebody else" in said) == secure
+
+
+def test_an_answer_without_end_is_not_read_and_a_small_one_not_made_large():
+    zeros = bytes(1 << 16)
+    packed = gzip.compress(bytes(8 << 20), 9)
+    for headers, pieces, most in [
+        ({}, itertools.repeat(zeros), fetching.MOST_BYTES),
+        ({"Content-Encoding": "gzip"}, [packed], len(packed)),
+    ]:
+        with answering(headers, pieces) as url, fetching.client_of(url) as client:
+            answer = fetching.fetch(client, "/")
+        assert answer.status == 200 and len(answer.body) == most and not answer.table
+    assert answer.text == ""
+
+
+async def test_what_breaks_off_is_a_finding():
+    with answering({"Content-Length": "10"}, [b"x"]) as url:
+        found = await looked_at(url)
+    assert found[-1].grade == "bad" and "RemoteProtocolError" in found[-1].what
+
+
+async def test_a_server_that_says_nothing_is_not_waited_for(monkeypatch):
+    async def silent(wire):
+        if wire.request.path == "/echo":
+            async for message in wire:
+                await wire.send(message)
+        await wire.wait_closed()
+
+    monkeypatch.setattr(visit, "PATIENCE", 0.2)
+    async with serve(silent, "127.0.0.1", 0) as server:
+        url = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        visitor = visit.Visitor(url, None, "")
+        assert told(await visitor.findings())[-1].startswith(
+            "no conversation begins (nothing came for 0.2 s)"
+        )

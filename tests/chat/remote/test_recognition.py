@@ -118,3 +118,22 @@ def test_a_part_that_claims_more_than_the_file_is_refused():
 def test_a_file_that_claims_more_than_it_holds_is_read():
     pcm = read_wav(io.BytesIO(wav(RATE, 1, 16, 0xFFFFFFFE, bytes(3200))))
     assert len(pcm) == 1600
+
+
+@pytest.mark.parametrize("charset", ["punycode", "utf-16", "no-such", "idna", '"utf-7"'])
+async def test_a_form_in_an_odd_coding_is_not_decoded(charset):
+    body = form(bytes(wav(RATE, 1, 16, 3200, bytes(3200))))
+    app, statuses = service_app("recognition", Deaf, Limits(seconds=3)), []
+    async with serving(app) as url, visiting(url) as client:
+        for given in (f"; charset={charset}", "", "; charset=UTF-8", '; charset="utf8"'):
+            headers = {"Content-Type": "Multipart/Form-Data; boundary=xx" + given}
+            answer = await client.post("v1/audio/transcriptions", content=body, headers=headers)
+            statuses.append(answer.status_code)
+    assert statuses == [400, 200, 200, 200]
+
+
+def form(data):
+    """A form with a file, which a field precedes that some codings take long to decode."""
+    field = b'Content-Disposition: form-data; name="x"\r\n\r\n' + 10_000 * b"a"
+    file = b'Content-Disposition: form-data; name="file"; filename="a.wav"\r\n\r\n' + data
+    return b"--xx\r\n" + field + b"\r\n--xx\r\n" + file + b"\r\n--xx--\r\n"

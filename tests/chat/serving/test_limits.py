@@ -8,7 +8,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
-from ico3d.chat.serving.limits import FORGIVEN, ConnectionLimits, Inlet
+from ico3d.chat.serving.limits import FORGIVEN, Inlet, SessionLimits
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import (
     MICROPHONE_CHUNK,
@@ -52,13 +52,13 @@ def check(limits, sound):
 
 
 def test_a_page_may_be_clumsy_a_few_times_only():
-    limits = ConnectionLimits(Time())
+    limits = SessionLimits(Time())
     assert [limits.forgive() for _ in range(FORGIVEN)] == [True] * (FORGIVEN - 1) + [False]
 
 
 def test_clumsiness_is_forgotten():
     time = Time()
-    limits = ConnectionLimits(time)
+    limits = SessionLimits(time)
     for _ in range(100):
         assert limits.forgive()
         time.now += 10.0
@@ -67,7 +67,7 @@ def test_clumsiness_is_forgotten():
 @pytest.mark.parametrize("kind", [Text, Say])
 def test_nobody_types_several_questions_a_second(kind):
     time = Time()
-    limits = ConnectionLimits(time)
+    limits = SessionLimits(time)
     for _ in range(10):
         limits.check_message(kind("who are you"))
     with pytest.raises(ProtocolError, match="questions"):
@@ -79,7 +79,7 @@ def test_nobody_types_several_questions_a_second(kind):
 
 def test_rates_are_limited_by_the_clock():
     time = Time()
-    limits = ConnectionLimits(time)
+    limits = SessionLimits(time)
     for _ in range(200):
         limits.check_frame("{}")
     with pytest.raises(ProtocolError):
@@ -94,7 +94,7 @@ def test_rates_are_limited_by_the_clock():
 @pytest.mark.parametrize("seconds", [1.0, 5.0, 20.0, 59.0])
 def test_sound_that_a_stall_held_back_breaks_no_rule(seconds):
     time = Time()
-    limits = ConnectionLimits(time)
+    limits = SessionLimits(time)
     for _ in range(10):
         time.now += seconds
         for sound in spoken(seconds):
@@ -104,7 +104,7 @@ def test_sound_that_a_stall_held_back_breaks_no_rule(seconds):
 @pytest.mark.parametrize("speed", [2.0, 4.0, 100.0])
 def test_sound_at_several_times_real_time_is_a_flood(speed):
     time = Time()
-    limits, sent = ConnectionLimits(time), 0.0
+    limits, sent = SessionLimits(time), 0.0
     with pytest.raises(ProtocolError, match="more"):
         while sent < 600:
             time.now += CHUNK / speed

@@ -9,6 +9,7 @@ from unittest import mock
 import pytest
 from websockets.asyncio.client import connect
 
+from ico3d.chat.serving.limits import RETURNS, RETURNS_AT_ONCE
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import (
     VERSION,
@@ -252,3 +253,35 @@ async def test_who_leaves_makes_room_at_once(bundle):
             async with asyncio.timeout(2):
                 while len(sessions):
                     await asyncio.sleep(0.02)
+
+
+async def test_limits_stay_when_a_page_comes_back(bundle):
+    async with serving(bundle, TYPED) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        (session,) = sessions.present()
+        limits, inlet = session.limits, session.inlet
+        while limits.forgive():
+            pass
+        await dropped(page)
+        async with wire(url, welcome.session) as again:
+            assert (await told(again)).resumed
+            assert (session.limits, session.inlet) == (limits, inlet)
+            await again.send("nonsense")
+            await again.wait_closed()
+            assert again.close_code == 1008
+
+
+async def test_a_page_that_comes_back_without_end_has_to_wait(bundle):
+    async with serving(bundle, TYPED) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        await dropped(page)
+        for _ in range(RETURNS_AT_ONCE):
+            async with wire(url, welcome.session) as again:
+                assert (await told(again)).resumed
+                again.transport.abort()
+        async with wire(url, welcome.session) as again:
+            await again.wait_closed()  # without a word that would end the session
+            assert again.close_code == 1013
+        await asyncio.sleep(1 / RETURNS)
+        async with wire(url, welcome.session) as again:
+            assert (await told(again)).resumed and len(sessions) == 1

@@ -6,11 +6,24 @@ from dataclasses import replace
 
 import pytest
 
+from ico3d.chat.services import choose
 from ico3d.chat.serving.sessions import STARTS_AT_ONCE, HastyError
-from ico3d.chat.settings.conversation import ChatSettings, Turns
+from ico3d.chat.settings.conversation import ChatSettings, Choice, Turns
 from ico3d.chat.settings.visits import Visits
 from ico3d.chat.supervision.allowance import Allowance, Bucket
-from ico3d.chat.wire.protocol import VERSION, Answer, Clock, Error, Hello, Interrupt, Say, Text
+from ico3d.chat.wire.protocol import (
+    VERSION,
+    Answer,
+    Clock,
+    Error,
+    Heard,
+    Hello,
+    Interrupt,
+    Say,
+    Talk,
+    Text,
+    Transcript,
+)
 from ico3d.chat.wire.sentences import HASTY, LONG
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.scripted import Script
@@ -21,6 +34,7 @@ pytestmark = pytest.mark.slow
 
 QUICK = Script(0.0, 0.0, 0.0, seconds=0.5)
 TURNS = Turns(speculate=False)
+BROWSER = choose(ChatSettings(recognition=Choice("browser", {"fallback": ""}))).recognition
 
 
 def limited(**limits):
@@ -221,3 +235,58 @@ def test_limits_with_which_nobody_could_talk_are_one_sentence(limits):
 def test_an_address_has_half_of_the_places_unless_told():
     assert [Visits().share(most) for most in (1, 2, 4, 5)] == [1, 1, 2, 3]
     assert Visits(sessions_per_address=30).share(40) == 30
+
+
+async def dictate(guest, first, *texts):
+    """Holds the button while the browser hears something."""
+    conversation = guest.session.conversation
+    await conversation.handle(Talk(True))
+    for number, text in enumerate(texts, first):
+        await asyncio.sleep(0.1)
+        await conversation.handle(Heard(number, text, True))
+    await conversation.handle(Talk(False))
+
+
+def test_dictated_questions_count_like_typed_ones(bundle):
+    async def talk():
+        services = replace(QUICK.services(), recognition=BROWSER)
+        async with open_sessions(bundle, services, limited(questions_per_minute=2)) as sessions:
+            guest = await Guest.enter(sessions)
+            await asyncio.sleep(2)
+            counts = []
+            for number, wait in enumerate((0, 0, 0, 31)):
+                await asyncio.sleep(wait)
+                before = len(guest.got(Answer))
+                await dictate(guest, 3 * number, "who", "are", "you?")
+                await asyncio.sleep(4)
+                counts.append(len(guest.got(Answer)) - before)
+            told = [error.code for _, error in guest.got(Error)]
+            await guest.leave()
+            return counts, told
+
+    assert run(talk()) == ([1, 1, 0, 1], [HASTY.code])
+
+
+def test_a_question_that_has_begun_is_heard_to_its_end(bundle):
+    """Somebody else at the same address asks while the button is held."""
+
+    async def talk():
+        services = replace(QUICK.services(), recognition=BROWSER)
+        async with open_sessions(bundle, services, limited(questions_per_minute=1)) as sessions:
+            guest = await Guest.enter(sessions)
+            await asyncio.sleep(2)
+            conversation = guest.session.conversation
+            await conversation.handle(Talk(True))
+            for number, text in enumerate(("who", "are", "you?")):
+                await asyncio.sleep(0.1)
+                await conversation.handle(Heard(number, text, True))
+                conversation._allowance._buckets[0].drain(1)
+            await conversation.handle(Talk(False))
+            await asyncio.sleep(3)
+            await dictate(guest, 3, "and", "why?")
+            await asyncio.sleep(3)
+            words = [m.text for _, m in guest.got(Transcript) if m.final]
+            await guest.leave()
+            return words
+
+    assert run(talk())[-1] == "who are you?"

@@ -5,17 +5,18 @@ import socket
 import ssl
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
 import httpx
 
 from ico3d.chat.doctor import visit
+from ico3d.chat.doctor.fetching import PATIENCE, client_of, fetch
 from ico3d.chat.doctor.finding import Finding, bad, good, weak
 from ico3d.chat.serving.guard import LOOPBACK
 from ico3d.errors import SettingsError
 
-PATIENCE = 10.0  # s for an answer
+LOGS = "look at the log of proxy and server."
 RENEWED = 14  # days before its end by which a certificate should have been renewed
 
 
@@ -75,28 +76,58 @@ def findings(url: str, key: str = "") -> Iterator[Finding]:
     yield reached
     if reached.grade == "bad":
         return
+    proven = place.host in LOOPBACK  # that nobody else answers
     if place.scheme == "https":
         found = of_certificate(place, context)
         yield found
         if found.grade == "bad":  # the rest can be looked at all the same
             context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-    with httpx.Client(base_url=place.url, verify=context, timeout=PATIENCE) as client:
-        answering = of_server(client, place)
-        yield answering
-        if answering.grade == "bad":
-            return
-        yield from of_page(client)
-        if place.scheme == "https" and place.port in (None, 443):
-            yield of_plain(place)
-        token = token_for(client, key) if key else None
-        bundle = of_bundle(client, token)
-        yield bundle
-        if bundle.grade != "good":
-            return
-        cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+        else:
+            proven = True
+    if key and not proven:
+        yield unsent(place)
+        key = ""
+    with client_of(place.url, context) as client:
+        try:
+            yield from of_site(client, place, context, key)
+        except httpx.HTTPError as error:
+            yield bad(f"an answer broke off ({type(error).__name__})", LOGS)
+
+
+def of_site(
+    client: httpx.Client, place: Place, context: ssl.SSLContext, key: str
+) -> Iterator[Finding]:
+    """Looks at what is served, and visits it.
+
+    Raises:
+        HTTPError: If an answer breaks off.
+    """
+    answering = of_server(client, place)
+    yield answering
+    if answering.grade == "bad":
+        return
+    yield from of_page(client)
+    if place.scheme == "https" and place.port in (None, 443):
+        yield of_plain(place)
+    token = token_for(client, key) if key else None
+    bundle = of_bundle(client, token)
+    yield bundle
+    if bundle.grade != "good":
+        return
+    cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
     secured = context if place.scheme == "https" else None
     visitor = visit.Visitor(place.url, secured, cookies, token)
     yield from asyncio.run(visitor.findings())
+
+
+def unsent(place: Place) -> Finding:
+    """Why the key stays here."""
+    if place.scheme == "http":
+        return weak("the key was not sent: everybody on the way could read it", "use HTTPS.")
+    return weak(
+        "the key was not sent: whoever answers may be somebody else",
+        "mend the certificate first.",
+    )
 
 
 def of_way(place: Place) -> Finding:
@@ -145,19 +176,19 @@ def of_certificate(place: Place, context: ssl.SSLContext) -> Finding:
 def of_server(client: httpx.Client, place: Place) -> Finding:
     """Whether the server is up, and takes visitors under this name."""
     try:
-        answer = client.get("/ready")
+        answer = fetch(client, "/ready")
     except httpx.HTTPError as error:
-        return bad(f"no answer ({type(error).__name__})", "look at the log of proxy and server.")
-    if answer.status_code == 403:
+        return bad(f"no answer ({type(error).__name__})", LOGS)
+    if answer.status == 403:
         return bad(
             "the server does not know this name",
             f"serve with --name {place.host}, and let the proxy leave Host as it is.",
         )
-    if answer.status_code == 503 and answer.headers.get("content-type") == "application/json":
+    if answer.status == 503 and answer.headers.get("content-type") == "application/json":
         return bad("the server is about to end", "wait until it has started again.")
-    if answer.status_code != 200:
+    if answer.status != 200:
         return bad(
-            f"the server is not ready (status {answer.status_code})",
+            f"the server is not ready (status {answer.status})",
             "start it, and give the proxy its address.",
         )
     return good("the server is ready for visitors")
@@ -165,16 +196,16 @@ def of_server(client: httpx.Client, place: Place) -> Finding:
 
 def of_page(client: httpx.Client) -> Iterator[Finding]:
     """Whether the page comes whole, protected and compressed, and figures do not."""
-    page = client.get("/")
-    if page.status_code != 200:
-        yield bad(f"the page does not come (status {page.status_code})", page.text.strip()[:200])
+    page = fetch(client, "/")
+    if page.status != 200:
+        yield bad(f"the page does not come (status {page.status})", page.text.strip()[:200] or LOGS)
     elif "content-security-policy" not in page.headers:
         yield bad("headers that protect the page are lost", "let the proxy pass them on.")
     elif "content-encoding" not in page.headers:
         yield weak("the page is not compressed", "let the proxy pass Accept-Encoding on.")
     else:
         yield good("the page comes compressed, with the headers that protect it")
-    if client.get("/metrics").status_code == 200:
+    if fetch(client, "/metrics").status == 200:
         yield bad("figures are public at /metrics", "let the proxy pass only the page's port on.")
     else:
         yield good("figures are not public")
@@ -182,28 +213,31 @@ def of_page(client: httpx.Client) -> Iterator[Finding]:
 
 def token_for(client: httpx.Client, key: str) -> str | None:
     """What admits a page, for a key; None if it is wrong."""
-    answer = client.post("/token", headers={"Authorization": f"Bearer {key}"})
-    return str(answer.json()["token"]) if answer.status_code == 200 else None
+    headers = {"Authorization": f"Bearer {key}", "Accept-Encoding": "identity"}
+    answer = fetch(client, "/token", "POST", headers=headers)
+    token = answer.table.get("token")
+    return token if answer.status == 200 and isinstance(token, str) else None
 
 
 def of_bundle(client: httpx.Client, token: str | None) -> Finding:
     """Whether the bundle is served to those who are admitted."""
     parameters = {"token": token} if token else {}
-    manifest = client.get("/bundle/manifest.json", params=parameters)
-    if manifest.status_code == 200:
+    manifest = fetch(client, "/bundle/manifest.json", params=parameters)
+    if manifest.status == 200:
         return good("the bundle is served")
-    if manifest.status_code == 401:
+    if manifest.status == 401:
         return weak(
             "visitors have to show a key, so this is as far as one gets without it",
             "name the environment variable that holds it with --key-variable.",
         )
-    return bad(f"the bundle is not served (status {manifest.status_code})", "see the log.")
+    return bad(f"the bundle is not served (status {manifest.status})", "see the log.")
 
 
 def of_plain(place: Place) -> Finding:
     """Whether who types the name alone is led to HTTPS."""
     try:
-        answer = httpx.get(f"http://{place.host}/", timeout=PATIENCE)
+        with client_of(replace(place, scheme="http", port=None).url) as client:
+            answer = fetch(client, "/")
     except httpx.HTTPError:
         return weak("port 80 does not answer", "open it: who types the name alone begins there.")
     if answer.headers.get("location", "").startswith("https://"):

@@ -1,5 +1,6 @@
 """A short visit: whether WebSockets pass, strangers do not, and a dropped page finds back."""
 
+import asyncio
 import ssl
 import statistics
 import time
@@ -19,6 +20,7 @@ ROUNDS = 5  # messages by which the way is timed
 DROPS = 4  # lost connections after which a proxy without a rule has most likely chosen wrongly
 SLOW = 0.3  # s to and fro from which a conversation feels slow
 FOREIGN = "https://foreign.example"
+FAULTS = (OSError, WebSocketException, TimeoutError, ProtocolError)
 
 
 class Visitor:
@@ -42,11 +44,12 @@ class Visitor:
     async def findings(self) -> Iterable[Finding]:
         """Everything that was found."""
         try:
-            way = await self._way()
-        except (OSError, WebSocketException, TimeoutError) as error:
+            async with asyncio.timeout(PATIENCE):
+                way = await self._way()
+        except FAULTS as error:
             return [
                 bad(
-                    f"no WebSocket can be opened ({error})",
+                    f"no WebSocket can be opened ({reason(error)})",
                     "let the proxy pass Upgrade, Host and Origin on.",
                 )
             ]
@@ -88,13 +91,17 @@ class Visitor:
                 )
         except InvalidHandshake:
             return good("pages of other sites are refused")
+        except FAULTS as error:
+            return weak(
+                f"pages of other sites get no answer ({reason(error)})", "see the proxy's log."
+            )
 
     async def _talk(self) -> list[Finding]:
         """Begins a conversation, loses its connection, and comes back."""
         try:
             first, wire = await self._greeted(None)
-        except (OSError, WebSocketException, TimeoutError, ProtocolError) as error:
-            return [bad(f"no conversation begins ({error})", "see the server's log.")]
+        except FAULTS as error:
+            return [bad(f"no conversation begins ({reason(error)})", "see the server's log.")]
         if isinstance(first, Place):
             await wire.close()
             return [good(f"all places are taken; the queue has {first.position - 1} before us")]
@@ -108,7 +115,13 @@ class Visitor:
         """Whether the way back leads to the server that has the conversation."""
         for _ in range(DROPS):
             wire.transport.abort()
-            first, wire = await self._greeted(session)
+            try:
+                first, wire = await self._greeted(session)
+            except FAULTS as error:
+                return bad(
+                    f"a page that loses its connection does not come back ({reason(error)})",
+                    "see the server's log.",
+                )
             if not isinstance(first, Welcome) or not first.resumed:
                 await wire.close()
                 return bad(
@@ -121,5 +134,15 @@ class Visitor:
     async def _greeted(self, session: str | None) -> tuple[ServerMessage, ClientConnection]:
         """Opens a connection and says hello; the server's first message."""
         wire = await self._connect("/ws", self._url)
-        await wire.send(encode(Hello(protocol.VERSION, session, -1)))
-        return decode_server(await wire.recv()), wire
+        try:
+            async with asyncio.timeout(PATIENCE):
+                await wire.send(encode(Hello(protocol.VERSION, session, -1)))
+                return decode_server(await wire.recv()), wire
+        except FAULTS:
+            wire.transport.abort()
+            raise
+
+
+def reason(error: Exception) -> str:
+    """What went wrong, in a few words."""
+    return f"nothing came for {PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)

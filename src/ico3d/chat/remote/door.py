@@ -1,8 +1,10 @@
 """Admission of requests to a module: key, size, and number at a time."""
 
 import asyncio
+import codecs
 import hmac
 
+from python_multipart.multipart import parse_options_header
 from starlette.datastructures import Headers
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -51,6 +53,8 @@ class Door:
         length = headers.get("content-length", "0")
         if length.isdecimal() and int(length) > self._limits.megabytes * 1e6:
             return 413, too_large(self._limits.megabytes)
+        if not is_plain_form(headers.get("content-type")):
+            return 400, "a form must be in UTF-8."
         return None
 
 
@@ -102,6 +106,16 @@ class Body:
     @property
     def _is_over(self) -> bool:
         return self._taken > self._megabytes * 1e6
+
+
+def is_plain_form(content_type: str | None) -> bool:
+    """Whether a request's form, if it is one, is in UTF-8: others may take quadratic time."""
+    kind, options = parse_options_header(content_type)  # as Starlette reads it
+    charset = options.get(b"charset", b"utf-8").decode("latin-1")
+    try:
+        return kind != b"multipart/form-data" or codecs.lookup(charset).name == "utf-8"
+    except (LookupError, ValueError):
+        return False
 
 
 def too_large(megabytes: float) -> str:

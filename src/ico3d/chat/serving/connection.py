@@ -10,8 +10,7 @@ from loguru import logger
 from ico3d.chat.observing.failures import cause
 from ico3d.chat.page import Outbox
 from ico3d.chat.serving.crowd import machine_of
-from ico3d.chat.serving.limits import ConnectionLimits, Inlet
-from ico3d.chat.serving.sessions import HastyError, Session, Sessions
+from ico3d.chat.serving.sessions import HastyError, RestlessError, Session, Sessions
 from ico3d.chat.serving.waiting import ClosedError, FullError, Ticket
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
@@ -60,8 +59,6 @@ class Connection:
             notices: Sentences about the avatar that every page shows.
         """
         self._socket, self._sessions, self._notices = socket, sessions, notices
-        now = asyncio.get_running_loop().time
-        self._limits, self._inlet = ConnectionLimits(now), Inlet(now)
         self._outbox = Outbox()
 
     async def run(self) -> None:
@@ -81,6 +78,9 @@ class Connection:
             await self._read(session)
         except Hangup as hangup:
             await self._hang_up(hangup)
+        except RestlessError:
+            self._sessions.monitor.failed("restless")
+            await self._close(BUSY)  # without a last word: the page tries again, a little later
         except WebSocketDisconnect as disconnect:
             for_good = disconnect.code in GONE and not self._outbox.is_closed
         except Exception as error:
@@ -187,16 +187,16 @@ class Connection:
                 binary += 1
                 self._outbox.put(Ack(binary))
             try:
-                self._limits.check_frame(frame)
+                session.limits.check_frame(frame)
                 message = decode_client(frame)
-                self._limits.check_message(message)
-                for due in self._inlet.admit(message):
+                session.limits.check_message(message)
+                for due in session.inlet.admit(message):
                     await session.conversation.handle(due)
             except OversizedError as error:
                 raise Hangup(TOO_BIG, str(error)) from error
             except ProtocolError as error:
                 self._sessions.monitor.failed("protocol")
-                if not self._limits.forgive():
+                if not session.limits.forgive():
                     raise Hangup(BROKEN, str(error), again=True) from error
                 self._outbox.put(Error(str(error), fatal=False))
 
@@ -232,7 +232,11 @@ class Connection:
         logger.debug(f"closing a connection with {hangup.code}: {hangup}")
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             await self._socket.send_text(str(encode(hangup.told)))
-            await self._socket.close(hangup.code)
+        await self._close(hangup.code)
+
+    async def _close(self, code: int) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await self._socket.close(code)
 
 
 def _is_big(error: ProtocolError) -> bool:

@@ -21,6 +21,7 @@ from ico3d.errors import ProtocolError
 STALL = 60  # s for which a network may hold back what a microphone makes, and deliver it at once
 AUDIO_RATE = 1.25 * MICROPHONE_RATE  # samples per second for long: clocks differ a little
 QUESTIONS, AT_ONCE = 1.0, 10  # per second for long, and at once: each has a language model begin
+RETURNS, RETURNS_AT_ONCE = 0.5, 10  # resumptions: each has all that was missed sent again
 FORGIVEN = 5  # broken rules after which a connection is closed
 FORGOTTEN = 10.0  # s after which one of them is forgotten
 
@@ -31,20 +32,25 @@ SETTLED = 0.2  # s of sound: how far the balance falls at most, so how soon a ba
 KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and how it began
 
 
-class ConnectionLimits:
-    """The limits of one connection.
+class SessionLimits:
+    """The limits of one page; a new connection of the same session does not reset them.
 
     The limit for sound is generous: when a stalled network recovers, all that the microphone
     recorded meanwhile arrives at once, through no fault of the page.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic):
-        """Starts a connection; `now` returns the time in seconds."""
+        """Starts a session; `now` returns the time in seconds."""
         self._texts = Bucket(MAX_RATE, MAX_BURST, now)
         self._sounds = Bucket(MAX_RATE, STALL * MICROPHONE_RATE / MICROPHONE_CHUNK, now)
         self._samples = Bucket(AUDIO_RATE, STALL * MICROPHONE_RATE, now)
         self._questions = Bucket(QUESTIONS, AT_ONCE, now)
+        self._returns = Bucket(RETURNS, RETURNS_AT_ONCE, now)
         self._forgiveness = Bucket(1 / FORGOTTEN, FORGIVEN - 1, now)
+
+    def come_back(self) -> bool:
+        """Counts a resumption; False if there were too many in a short time."""
+        return self._returns.take(1)
 
     def check_frame(self, frame: str | bytes) -> None:
         """Counts a frame; binary frames contain sound.

@@ -12,6 +12,7 @@ from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.services.offers import wished
 from ico3d.chat.serving.crowd import Meters
 from ico3d.chat.serving.freeing import give_back
+from ico3d.chat.serving.limits import Inlet, SessionLimits
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
 from ico3d.chat.supervision.allowance import Allowance, Bucket
 from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
@@ -24,6 +25,10 @@ STARTING = 30.0  # s that a conversation may take to start: a model may be loade
 
 class HastyError(Exception):
     """A machine has begun more conversations than it may in a short time."""
+
+
+class RestlessError(Exception):
+    """A page resumes its session more often than broken lines explain."""
 
 
 class Session:
@@ -47,7 +52,8 @@ class Session:
             allowance: How much the visitor may ask.
         """
         self.id, self.machine = ticket.id, ticket.machine
-        self.began = asyncio.get_running_loop().time()
+        self.began = _now()
+        self.limits, self.inlet = SessionLimits(_now), Inlet(_now)
         self.page = Page()
         seed = secrets.randbits(32)  # no two visitors see the same blinks and gestures
         self.conversation = Conversation(
@@ -114,8 +120,11 @@ class Sessions:
             FullError: If the queue is full; sessions whose page is away count as taken places.
             HastyError: If the machine has begun too many conversations in a short time.
             ClosedError: If the server is about to end.
+            RestlessError: If the page has resumed its session too often in a short time.
         """
         if self._resumable(hello):
+            if not self._open[hello.session or ""].limits.come_back():
+                raise RestlessError
             return None
         if not self.line.knows(hello.session) and not self._starts.take(machine):
             raise HastyError

@@ -51,13 +51,20 @@ class Allowance(BaseObserver):
         """Takes the buckets from which each question is drawn; without any there is no limit."""
         super().__init__(observe_every_push=False)
         self._buckets = buckets
+        self.is_begun = False
+        """Whether words of a question were heard of which no request has been made yet."""
 
     def may_ask(self) -> bool:
         """Whether the visitor may ask a question now."""
         return all(bucket.has(1) for bucket in self._buckets)
 
+    def begin(self) -> None:
+        """Notes that a question has begun: it is heard until it has become a request."""
+        self.is_begun = True
+
     def spend(self) -> None:
         """Counts a question."""
+        self.is_begun = False
         for bucket in self._buckets:
             bucket.drain(1)
 

@@ -34,6 +34,7 @@ MAX_RATE = 100  # messages per second a client may send for long
 MAX_BURST = 200  # messages it may send at once
 RESUME_SECONDS = 30  # how long a session waits for its page to come back
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
+MAX_QUESTION = 2000  # characters of a question, however it is asked
 MAX_ARGUMENTS = 4000  # characters of a function's arguments
 MAX_POINTS = 500  # of a timeline in one message
 MAX_WORDS = 500  # of a sentence that are timed
@@ -66,7 +67,7 @@ class Text:
         text: The question.
     """
 
-    text: Annotated[str, Length(1, 2000)]
+    text: Annotated[str, Length(1, MAX_QUESTION)]
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Say:
         text: The text.
     """
 
-    text: Annotated[str, Length(1, 2000)]
+    text: Annotated[str, Length(1, MAX_QUESTION)]
 
 
 @dataclass(frozen=True)

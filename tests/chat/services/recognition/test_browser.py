@@ -7,7 +7,16 @@ import pytest
 from ico3d.chat.services import choose
 from ico3d.chat.services.recognition import browser
 from ico3d.chat.settings.conversation import ChatSettings, Choice
-from ico3d.chat.wire.protocol import Answer, Deaf, Error, Heard, State, Transcript
+from ico3d.chat.wire.protocol import (
+    MAX_QUESTION,
+    Answer,
+    Deaf,
+    Error,
+    Heard,
+    State,
+    Talk,
+    Transcript,
+)
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
 from support.chat.recognisers import silent
@@ -108,3 +117,43 @@ def test_the_fallback_is_a_choice():
     assert isinstance(nobody.recognition.make(None), browser.BrowserRecognition)
     with pytest.raises(SettingsError, match="'browser' is unknown"):
         choose(ChatSettings(recognition=Choice("browser", {"fallback": "browser"}))).dictation()
+
+
+def finals(count, letters, first=0):
+    return [Heard(first + n, f"{n:03d}".ljust(letters, "a"), True) for n in range(count)]
+
+
+@pytest.mark.parametrize(
+    "results",
+    [finals(browser.MOST_RESULTS + 30, 5), finals(40, 4000), [Heard(0, "word " * 800, True)]],
+    ids=["many", "long", "one"],
+)
+def test_a_turn_holds_no_more_than_a_typed_question(results):
+    room = browser.Room()
+    taken = [room.take(heard.text) for heard in results]
+    kept = [words for words in taken if words]
+    assert len(kept) <= browser.MOST_RESULTS and len(" ".join(kept)) <= MAX_QUESTION
+    whole = [heard.text for heard in results[: len(kept)]]
+    assert kept == [text[: len(words)] for text, words in zip(whole, kept, strict=True)]
+    assert room.fit("more") == "" or len(" ".join(kept)) < MAX_QUESTION - 1
+    room.clear()
+    assert room.take("what is") == "what is"
+
+
+async def test_words_of_a_held_button_end_like_typed_ones(bundle):
+    async with serving(bundle, ALONE, adapt=silent) as (url, _):
+        page, _ = await open_page(url, microphone=False)
+        await page.send(Talk(True))
+        await page.wait(State, where=lambda m: m.state == "listening")
+        for heard in finals(3, 1500):
+            await page.send(heard)
+        await page.wait(Transcript, where=lambda m: len(m.text) > 1600)
+        await page.send(Talk(False))
+        await page.wait(Answer)
+        await page.send(Talk(True))  # a turn with room again
+        await page.wait(State, where=lambda m: m.state == "listening")
+        await page.send(Heard(3, "What is your name?", True))
+        await page.send(Talk(False))
+        await page.wait(Answer, where=lambda m: m.text == "I am Random.")
+        assert max(len(m.text) for m in page.messages(Transcript)) == MAX_QUESTION
+        await page.close()

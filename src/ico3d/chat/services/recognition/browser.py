@@ -13,6 +13,8 @@ from pipecat.frames.frames import (
     InterimTranscriptionFrame,
     ManuallySwitchServiceFrame,
     TranscriptionFrame,
+    UserStartedSpeakingFrame,
+    UserStoppedSpeakingFrame,
     VADUserStartedSpeakingFrame,
     VADUserStoppedSpeakingFrame,
 )
@@ -28,11 +30,36 @@ from ico3d.chat.services.choosing import ChosenService, chosen
 from ico3d.chat.services.provider import Context, Table
 from ico3d.chat.services.recognition.segments import blank
 from ico3d.chat.settings.conversation import BEST, Choice
-from ico3d.chat.wire.protocol import Deaf, Heard
+from ico3d.chat.wire.protocol import MAX_QUESTION, Deaf, Heard
 
 SETTLED = 0.5  # s without news in silence after which partial words are taken for final ones
 SLOWEST = 1.5  # s that a browser may take for its first words
 LATE = 3.0  # s after a voice in which its words may still come
+MOST_RESULTS = 200  # final ones of a turn: nobody says more in one breath
+
+
+class Room:
+    """What a turn may still hold: as many letters as a typed question, in so many results."""
+
+    def __init__(self):
+        """Starts with an empty turn."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Begins a new turn."""
+        self._letters, self._results = MAX_QUESTION, MOST_RESULTS
+
+    def fit(self, words: str) -> str:
+        """The part of a result for which there is room."""
+        return words.strip()[: self._letters].strip() if self._results else ""
+
+    def take(self, words: str) -> str:
+        """As `fit`, for words that are final."""
+        words = self.fit(words)
+        if words:
+            self._letters = max(0, self._letters - len(words) - 1)  # and the space behind them
+            self._results -= 1
+        return words
 
 
 @dataclass(frozen=True)
@@ -65,6 +92,7 @@ class BrowserRecognition(STTService):
         self._taken = -1  # the last result whose words are final here
         self._understood = False  # whether there were final words since the voice began
         self._voice_until = -LATE  # the event loop's clock
+        self._room, self._in_turn = Room(), False
         self._timer: asyncio.Task | None = None
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
@@ -82,13 +110,20 @@ class BrowserRecognition(STTService):
             await self._hear(heard)
             return
         await super().process_frame(frame, direction)
-        if isinstance(frame, VADUserStoppedSpeakingFrame):
+        if isinstance(frame, UserStartedSpeakingFrame):
+            self._in_turn = True
+        elif isinstance(frame, UserStoppedSpeakingFrame):
+            self._in_turn = False
+            self._room.clear()
+        elif isinstance(frame, VADUserStoppedSpeakingFrame):
             self._voice_until = self._now()
             await self._restart_timer()
 
     async def _handle_vad_user_started_speaking(self, frame: VADUserStartedSpeakingFrame):
         await super()._handle_vad_user_started_speaking(frame)
         self._understood = False
+        if not self._in_turn:
+            self._room.clear()  # what was said before has become no turn
         await self._stop_timer()
 
     async def _hear(self, heard: Heard) -> None:
@@ -99,17 +134,21 @@ class BrowserRecognition(STTService):
             await self._take(heard)
             return
         self._partial = heard
-        await self.push_frame(InterimTranscriptionFrame(heard.text, "", time_now_iso8601()))
+        if words := self._room.fit(heard.text):
+            await self.push_frame(InterimTranscriptionFrame(words, "", time_now_iso8601()))
         if not is_user_speaking(self):
             await self._restart_timer()
 
     async def _take(self, heard: Heard) -> None:
         self._taken, self._partial, self._understood = heard.result, None, True
-        words = TranscriptionFrame(heard.text.strip(), "", time_now_iso8601())
-        words.finalized = not is_user_speaking(self)
-        if words.finalized:
+        speaking, words = is_user_speaking(self), self._room.take(heard.text)
+        if not speaking:
             await self._stop_timer()
-        await self.push_frame(words)
+        if words:
+            said = TranscriptionFrame(words, "", time_now_iso8601(), finalized=not speaking)
+            await self.push_frame(said)
+        elif not speaking:
+            await self.push_frame(blank())  # the turn may end without the words that are too many
 
     async def _settle(self) -> None:
         await asyncio.sleep(SETTLED)
