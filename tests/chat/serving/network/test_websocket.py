@@ -9,9 +9,9 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import Frame, Opcode
 
-from ico3d.chat.serving import server
 from ico3d.chat.serving.network import websocket
 from ico3d.chat.wire.protocol import MAX_BURST, MAX_RATE
+from support.chat.serving import running
 
 HEAD = (
     b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -70,15 +70,9 @@ class Served:
 async def served():
     served, app = Served(), FastAPI()
     app.add_api_websocket_route("/", served.run)
-    listener = server.bind("127.0.0.1", 0)
-    served.port = listener.getsockname()[1]
-    served.running = server.make_server(app)
-    task = asyncio.create_task(served.running.serve(sockets=[listener]))
-    while not served.running.started:
-        await asyncio.sleep(0.01)
-    yield served
-    served.running.force_exit = served.running.should_exit = True
-    await task
+    async with running(app) as (served.running, listener):
+        served.port = listener.getsockname()[1]
+        yield served
 
 
 @pytest.mark.parametrize("kind", FLOODS)
