@@ -1,6 +1,5 @@
 """Modules as real HTTP servers in the test's own event loop."""
 
-import asyncio
 import contextlib
 
 from ico3d.bundle.format import SPEECH
@@ -13,6 +12,7 @@ from ico3d.chat.services.recognition import sphinx
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.serving import server
 from ico3d.speech.runtime import SpeechModel
+from support.chat.serving import running
 
 HOST = "127.0.0.1"
 ADA = Persona("Ada", "Hello.", ("who are you => I am Ada. I live in a box. Grüße, 你好!",))
@@ -22,16 +22,8 @@ CONTEXT = Context(ADA, None, None)
 @contextlib.asynccontextmanager
 async def serving(app, port=0):
     """Yields the URL of a running server of any ASGI application."""
-    listener = server.bind(HOST, port)
-    running = server.make_server(app)
-    task = asyncio.create_task(running.serve(sockets=[listener]))
-    while not running.started:
-        await asyncio.sleep(0.01)
-    try:
+    async with running(app, port=port) as (_, listener):
         yield server.address(listener)
-    finally:
-        running.should_exit = True
-        await task
 
 
 def service_app(kind, make, limits=None, key=""):

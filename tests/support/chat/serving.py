@@ -28,6 +28,21 @@ def free_port():
 
 
 @contextlib.asynccontextmanager
+async def running(app, *more, port=0):
+    """Yields the running server of any ASGI application, and its socket."""
+    listener = server.bind("127.0.0.1", port)
+    served = server.make_server(app, *more)
+    task = asyncio.create_task(served.serve(sockets=[listener]))
+    while not served.started:
+        await asyncio.sleep(0.01)
+    try:
+        yield served, listener
+    finally:
+        served.should_exit = True
+        await task
+
+
+@contextlib.asynccontextmanager
 async def serving(
     bundle,
     settings=None,
@@ -42,18 +57,10 @@ async def serving(
 
     `adapt` changes what its sessions share.
     """
-    listener = server.bind("127.0.0.1", 0)
     avatar, sessions = None, None
     if bundle.manifest.head:
         avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
         sessions = Sessions(avatar, resume_seconds)
     app = server.make_app(bundle, avatar, "127.0.0.1", sessions, sites)
-    running = server.make_server(app, certificate, proxies, sessions)
-    task = asyncio.create_task(running.serve(sockets=[listener]))
-    while not running.started:
-        await asyncio.sleep(0.01)
-    try:
+    async with running(app, certificate, proxies, sessions) as (_, listener):
         yield server.address(listener, "https" if certificate else "http"), sessions
-    finally:
-        running.should_exit = True
-        await task

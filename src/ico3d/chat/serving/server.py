@@ -26,6 +26,7 @@ from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.network.handshakes import behind_tls
 from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
+from ico3d.chat.serving.network.websocket import BoundedWebSocket
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.running.ending import PatientServer
 from ico3d.chat.serving.sessions import Sessions
@@ -191,6 +192,7 @@ def make_server(
         app,
         log_config=None,  # `operator_log` takes what it says
         log_level="warning",
+        ws=BoundedWebSocket,
         ws_max_size=protocol.MAX_BINARY_FRAME,
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,

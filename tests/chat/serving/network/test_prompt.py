@@ -4,17 +4,53 @@ import asyncio
 import contextlib
 
 import pytest
+from fastapi import FastAPI, Request
+from fastapi.responses import FileResponse
 
 from ico3d.chat.serving.network import prompt
-from support.chat.serving import serving
+from support.chat.serving import running, serving
 
 REQUEST = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n"
+HOST = b" HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+UPGRADE = (
+    b"Upgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\nSec-WebSocket-Version: 13\r\n"
+)
 
 
 @pytest.fixture
 async def port(body):
     async with serving(body) as (url, _):
         yield int(url.rstrip("/").rpartition(":")[2])
+
+
+@pytest.fixture
+async def unread(tmp_path):
+    """A server of a file that is too long for nobody to read it, and of a question's length.
+
+    Yields its port and its tasks.
+    """
+    app, file = FastAPI(), tmp_path / "file"
+    file.touch()
+    with file.open("r+b") as hole:
+        hole.truncate(1 << 24)
+    app.add_api_route("/file", lambda: FileResponse(file))
+
+    @app.post("/length")
+    async def length(request: Request):
+        return len(await request.body())
+
+    async with running(app) as (served, listener):
+        yield listener.getsockname()[1], served.server_state.tasks
+
+
+async def seconds_until_over(tasks):
+    now = asyncio.get_running_loop().time
+    begun = now()
+    async with asyncio.timeout(60):
+        while tasks:
+            await asyncio.sleep(0.01)
+    return now() - begun
 
 
 @contextlib.asynccontextmanager
@@ -64,6 +100,71 @@ async def test_a_head_without_end_is_cut_off(port):
     async with connected(port) as (reader, writer):
         writer.write(REQUEST % port + b"X-Long: " + b"x" * (prompt.LARGEST_HEAD + 1))
         assert await seconds_until_closed(reader) < 1
+
+
+@pytest.mark.parametrize(
+    "behind",
+    [
+        (b"GET /" + HOST + b"\r\n") * 2,
+        b"GET /echo" + HOST + UPGRADE + b"\r\n",
+        b"GET /" + HOST + b"X-Long: " + b"x" * (prompt.LARGEST_HEAD + 1),
+        b"GET /" + HOST + b"a: b\r\n" * (prompt.MOST_HEADERS + 1),
+    ],
+    ids=["requests", "a WebSocket", "a long head", "many headers"],
+)
+async def test_behind_an_answer_that_is_not_read_not_much_may_wait(unread, behind):
+    port, tasks = unread
+    reader, writer = await asyncio.open_connection("127.0.0.1", port, limit=1)
+    writer.write(b"GET /file" + HOST + b"\r\n")
+    assert await reader.read(1) == b"H"
+    await asyncio.sleep(0.1)  # until no more can be sent
+    writer.write(behind)
+    assert await seconds_until_over(tasks) < 2
+    writer.transport.abort()
+
+
+async def test_one_request_may_wait_for_another(port):
+    async with connected(port) as (reader, writer):
+        writer.write((REQUEST % port + b"\r\n") * 2)
+        for _ in range(2):
+            assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+            await reader.readexactly(len(b'{"ok":true}'))
+
+
+@pytest.mark.parametrize("more, answered", [(0, True), (1, False)])
+async def test_a_request_has_so_many_headers_and_no_more(port, more, answered):
+    async with connected(port) as (reader, writer):
+        writer.write(REQUEST % port + b"a: b\r\n" * (prompt.MOST_HEADERS - 1 + more) + b"\r\n")
+        with contextlib.suppress(ConnectionResetError):
+            assert (await reader.readline() == b"HTTP/1.1 200 OK\r\n") is answered
+
+
+@pytest.mark.parametrize("trailer", [b"x" * 5000, b"a: b\r\n" * 50])
+async def test_headers_behind_a_body_are_bounded_too(unread, trailer):
+    port, _ = unread
+    async with connected(port) as (reader, writer):
+        writer.write(b"POST /length" + HOST + b"Transfer-Encoding: chunked\r\n\r\n0\r\nX-Long: ")
+        closed = asyncio.create_task(seconds_until_closed(reader))
+        for _ in range(20):
+            writer.write(trailer)
+            await asyncio.sleep(0.01)
+        assert await closed < 2
+
+
+@pytest.mark.parametrize("coding", ["chunks", "a length"])
+async def test_a_long_body_is_no_head(unread, coding):
+    port, _ = unread
+    body, size = bytes(1 << 18), 1 << 20
+    async with connected(port) as (reader, writer):
+        chunked = coding == "chunks"
+        told = b"Transfer-Encoding: chunked" if chunked else b"Content-Length: %d" % size
+        writer.write(b"POST /length" + HOST + told + b"\r\n\r\n")
+        for _ in range(size // len(body)):
+            writer.write(b"%x\r\n%s\r\n" % (len(body), body) if chunked else body)
+            await writer.drain()
+        writer.write(b"0\r\n\r\n" if chunked else b"")
+        assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+        assert await reader.readexactly(7) == b"%d" % size
 
 
 async def test_a_slow_but_honest_client_is_answered(port):

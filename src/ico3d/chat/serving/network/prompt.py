@@ -1,19 +1,23 @@
 """Connections whose requests arrive promptly, so that nobody holds many of them by being slow.
 
-uvicorn waits for the head of a request for ever, and opens as many connections as there are
-descriptors: some hundred silent ones would close a server to everybody.
+uvicorn waits for the head of a request for ever, queues all requests behind one whose answer is
+not read, and opens as many connections as there are descriptors: some hundred silent ones would
+close a server to everybody.
 """
 
 import asyncio
 import resource
 from collections import Counter
+from typing import NoReturn
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from ico3d.chat.serving.crowd import machine_of
+from ico3d.errors import ProtocolError
 
 HEAD = 10.0  # s for the head of a request
 LARGEST_HEAD = 1 << 16  # bytes
+MOST_HEADERS = 200  # of a request, those behind its body included
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 DESCRIPTORS = 1 << 16  # that a server asks the system for
 _open: Counter[str] = Counter()
@@ -22,7 +26,8 @@ _open: Counter[str] = Counter()
 class PromptProtocol(HttpToolsProtocol):
     """HTTP on one connection, which is closed if a request's head takes too long or is too large.
 
-    One machine may have so many connections open and no more. Those of proxies that the operator
+    Behind a request that is not answered yet, one more may wait: a client may be that quick. One
+    machine may have so many connections open and no more. Those of proxies that the operator
     has stated, and of this machine, are not counted.
     """
 
@@ -31,7 +36,8 @@ class PromptProtocol(HttpToolsProtocol):
         super().connection_made(transport)
         proxies = getattr(self.app, "trusted_hosts", ())
         self._machine = "" if self.client and self.client[0] in proxies else machine_of(self.client)
-        self._counted, self._head_bytes, self._in_body = True, 0, False
+        self._counted = True
+        self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
         if count_in(self._machine):
             self._await_head()
@@ -46,21 +52,45 @@ class PromptProtocol(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Takes bytes, unless they make a head too large."""
+        self._head_bytes += len(data)
         super().data_received(data)
-        if self._deadline is not None and not self._in_body:  # of a refused request, too
-            self._head_bytes += len(data)
-            if self._head_bytes > LARGEST_HEAD:
-                self.transport.abort()
+        if self._head_bytes > LARGEST_HEAD:
+            self.transport.abort()
+
+    def on_message_begin(self) -> None:
+        """A request begins, unless one waits already.
+
+        Raises:
+            ProtocolError: If one does; the connection is closed.
+        """
+        if self.pipeline:
+            self._cut_off("one request at a time, and one more.")
+        super().on_message_begin()
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """A header has arrived.
+
+        Raises:
+            ProtocolError: If it is one too many; the connection is closed.
+        """
+        if len(self.headers) >= MOST_HEADERS:
+            self._cut_off(f"more than {MOST_HEADERS} headers.")
+        super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
         """The head of a request has arrived."""
         self._stop_waiting()
-        self._in_body = True
+        self._head_bytes = 0
         super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        """A piece of a request's body has arrived."""
+        self._head_bytes = 0
+        super().on_body(body)
 
     def on_message_complete(self) -> None:
         """A request has arrived as a whole."""
-        self._in_body = False
+        self._head_bytes = 0
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
@@ -70,13 +100,18 @@ class PromptProtocol(HttpToolsProtocol):
             self._await_head()
 
     def handle_websocket_upgrade(self) -> None:
-        """Hands the connection over; WebSockets are counted elsewhere."""
+        """Hands the connection over; WebSockets are counted elsewhere.
+
+        Nobody would tell an answer that is still being written when its client has gone.
+        """
+        if self.cycle is not None and not self.cycle.response_complete:
+            self.transport.abort()
+            return
         self._uncount()
         super().handle_websocket_upgrade()
 
     def _await_head(self) -> None:
         self._stop_waiting()
-        self._head_bytes = 0
         self._deadline = self.loop.call_later(HEAD, self._give_up)
 
     def _stop_waiting(self) -> None:
@@ -88,6 +123,11 @@ class PromptProtocol(HttpToolsProtocol):
         self._deadline = None
         if self.cycle is None or self.cycle.response_complete:  # else a pipelined one is answered
             self.transport.abort()
+
+    def _cut_off(self, why: str) -> NoReturn:
+        """Closes the connection; the error has the parser leave the rest."""
+        self.transport.abort()
+        raise ProtocolError(why)
 
     def _uncount(self) -> None:
         if self._counted:
