@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from PIL import Image
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import EYE_NAMES, RecordedCapture, Sound, Split
-from ico3d.capture.decoding import DAMAGED, to_bytes, unit
+from ico3d.capture.decoding import DAMAGED, open_picture, to_bytes, unit
 from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
 from ico3d.capture.multiview.description import MOST_FRAMES, number, read_json
 from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
@@ -109,7 +108,7 @@ class TalkingPortrait(RecordedCapture):
         file = self.path / "torso_imgs" / f"{frame}.png"
         if frame not in self._poses or not file.is_file():
             return None
-        with _reading(file, lambda: Image.open(file)) as picture:
+        with _reading(file, lambda: open_picture(file, str(file))) as picture:
             if picture.mode != "RGBA":
                 raise CaptureError(f"{file} has no opacity: it must be RGBA.")
             return _reading(file, lambda: np.asarray(picture, np.float32) / 255)
@@ -220,7 +219,7 @@ class TalkingPortrait(RecordedCapture):
     def _camera(self, transforms: dict) -> Camera:
         """The steady camera; it is the world."""
         first = self._recorded(min(self._poses))
-        with _reading(first, lambda: Image.open(first)) as picture:
+        with _reading(first, lambda: open_picture(first, str(first))) as picture:
             width, height = picture.size
         file = self.path / "transforms_train.json"
         values = [transforms.get(k, d) for k, d in _lens_defaults(width, height)]
@@ -353,7 +352,7 @@ def _pose(path: Path, name: str, frame: dict) -> np.ndarray:
 def _picture(path: Path, *modes: str) -> np.ndarray:
     """A picture as uint8, in one of some modes of Pillow: as it is, or else in the first."""
     wanted = modes or ("RGB", "L")
-    with _reading(path, lambda: Image.open(path)) as opened:
+    with _reading(path, lambda: open_picture(path, str(path))) as opened:
         kept = opened.mode in wanted
         return _reading(path, lambda: np.asarray(opened if kept else opened.convert(wanted[0])))
 
