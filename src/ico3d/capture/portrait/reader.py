@@ -14,6 +14,7 @@ from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eye
 from ico3d.capture.multiview.description import MOST_FRAMES, number, read_json
 from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
 from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
+from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface.first_points import unknown_person
 from ico3d.common.camera import Camera
@@ -148,7 +149,10 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "points.npy"
         if not path.is_file():
             return unknown_person()
-        return _reading(path, lambda: np.load(path, allow_pickle=False))
+        points = read_numbers(path)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            raise CaptureError(f"{path} must hold (P, 3) finite numbers.")
+        return points
 
     @property
     def provenance(self) -> dict:
@@ -168,7 +172,7 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "bs.npy"
         if not path.is_file():
             return None
-        return np.asarray(_reading(path, lambda: np.load(path, allow_pickle=False)), np.float32)
+        return read_numbers(path).astype(np.float32)
 
     @cached_property
     def _action_units(self) -> dict[str, np.ndarray] | None:
@@ -202,10 +206,11 @@ class TalkingPortrait(RecordedCapture):
             return None
         from ico3d.capture.face.expressions import BLENDSHAPES
 
-        stated = tuple(self._details.get("blendshape_names", ()))
-        names = stated or BLENDSHAPES
-        columns = self._blendshapes.shape[-1]
-        if self._blendshapes.ndim != 2 or columns != len(names):
+        stated = self._details.get("blendshape_names", [])
+        if not isinstance(stated, list) or not all(isinstance(name, str) for name in stated):
+            raise CaptureError(f"{self.path / DETAILS}: blendshape_names must be a list of names.")
+        names = tuple(stated) or BLENDSHAPES
+        if self._blendshapes.ndim != 2 or self._blendshapes.shape[1] != len(names):
             raise CaptureError(
                 f"{self.path / 'bs.npy'}: expected {len(names)} columns, "
                 f"found shape {self._blendshapes.shape}."
