@@ -10,11 +10,13 @@ from PIL import Image, UnidentifiedImageError
 
 from ico3d.errors import CaptureError
 
+FORMATS = ("JPEG", "PNG")
+"""Kinds of pictures that recordings have, by Pillow's names: some others start programs (EPS)."""
 MOST_PIXELS = 8192 * 4320
 """Largest size of a picture, of a video too: what cameras record at most."""
 MOST_SIDE = 16_384
 """Longest side of a picture: beyond 32,766, OpenCV within MediaPipe ends the whole process."""
-DAMAGED = (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError)
+DAMAGED = (OSError, SyntaxError, ValueError, EOFError)
 """What Pillow raises for files that it cannot read; SyntaxError stands for a broken PNG."""
 
 
@@ -29,7 +31,8 @@ def decoded(source: Path | bytes, what: str) -> np.ndarray:
         uint8 (H, W, 3) RGB, or (H, W, 4) RGBA where the file has transparency.
 
     Raises:
-        CaptureError: If the picture is damaged or has more than 8 bits per value.
+        CaptureError: If the picture is damaged, larger than is taken, or has more than 8 bits per
+            value.
     """
     with _opened(source, what) as picture:
         if picture.mode[0] in "IF":
@@ -42,7 +45,7 @@ def size_of(source: Path | bytes, what: str) -> tuple[int, int]:
     """Width and height of a picture in pixels, from the file's header alone.
 
     Raises:
-        CaptureError: If the picture is missing or damaged.
+        CaptureError: If the picture is missing, damaged or larger than is taken.
     """
     with _opened(source, what) as picture:
         return picture.size
@@ -52,10 +55,40 @@ def has_opacity(source: Path | bytes, what: str) -> bool:
     """Whether a picture has transparent parts, from the file's header alone.
 
     Raises:
-        CaptureError: If the picture is missing or damaged.
+        CaptureError: If the picture is missing, damaged or larger than is taken.
     """
     with _opened(source, what) as picture:
         return _is_clear(picture)
+
+
+def open_picture(
+    source: Path | bytes, what: str, formats: tuple[str, ...] = FORMATS
+) -> Image.Image:
+    """Opens a picture of anybody by its header; its pixels are decoded when they are asked for.
+
+    Args:
+        source: A file, or the content of one.
+        what: Name of the picture in errors.
+        formats: Kinds that are taken, by Pillow's names.
+
+    Returns:
+        The picture, to be closed by the caller.
+
+    Raises:
+        CaptureError: If it is larger than is taken.
+        OSError: If it is missing, damaged or of another kind; others of `DAMAGED` too.
+    """
+    stream = io.BytesIO(source) if isinstance(source, bytes) else source
+    try:
+        picture = Image.open(stream, formats=formats)
+    except Image.DecompressionBombError as error:
+        raise CaptureError(f"{what}: the picture is larger than is taken.") from error
+    try:
+        check_size(what, *picture.size)
+    except CaptureError:
+        picture.close()
+        raise
+    return picture
 
 
 def check_size(what: str, width: int, height: int) -> None:
@@ -96,7 +129,7 @@ def largest_channel(picture: np.ndarray) -> np.ndarray:
 def _opened(source: Path | bytes, what: str) -> Iterator[Image.Image]:
     """An open picture; what Pillow cannot read within is one sentence."""
     try:
-        with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
+        with open_picture(source, what) as picture:
             yield picture
     except FileNotFoundError as error:
         raise CaptureError(f"{what} is missing.") from error

@@ -5,13 +5,12 @@ import wave
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 from safetensors import SafetensorError
 from safetensors.numpy import load
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
-from ico3d.capture.decoding import DAMAGED, unit
+from ico3d.capture.decoding import DAMAGED, open_picture, unit
 from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
@@ -229,7 +228,7 @@ def _camera(entry: dict, path: Path) -> Camera:
 def _read_png(file: Path, camera: Camera, mode: str, what: str) -> np.ndarray:
     """uint8 pixels of a file that must have the size of its camera."""
     try:
-        with Image.open(file) as image:
+        with open_picture(file, str(file)) as image:
             pixels = np.asarray(image if image.mode == mode else image.convert(mode))
     except DAMAGED as error:
         raise CaptureError(f"{file} ({what}) is missing or damaged: record again.") from error

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image, UnidentifiedImageError
 
+from ico3d.capture.decoding import DAMAGED, FORMATS, open_picture
 from ico3d.capture.video import open_video
 from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
@@ -17,6 +17,7 @@ from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import PICTURE, Scores, add_picture
 from ico3d.splat.device import CPU
 
+KINDS = (*FORMATS, "WEBP")
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 """Files of a folder that count as pictures."""
 WIDEST = 1 << 14
@@ -45,9 +46,9 @@ def pictures_of(path: Path, fps: float) -> Iterator[np.ndarray]:
         raise CaptureError(f"{path} has no pictures.")
     for file in files:
         try:
-            with Image.open(file) as opened:
+            with open_picture(file, str(file), KINDS) as opened:
                 picture = np.asarray(opened.convert("RGB"), np.float32) / 255
-        except (OSError, UnidentifiedImageError) as error:
+        except DAMAGED as error:
             raise CaptureError(f"{file} cannot be read as a picture: {error}.") from None
         yield picture
 

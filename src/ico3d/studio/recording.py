@@ -16,6 +16,7 @@ from rich.progress import Progress, TextColumn
 from safetensors.numpy import save
 
 from ico3d.capture.capture import Sound
+from ico3d.capture.decoding import open_picture
 from ico3d.capture.synthetic import FORMAT, VERSION
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
@@ -272,7 +273,8 @@ def _film(recording: Recording, acted: Performance, pictures: Path, out: Path) -
     """Writes what a webcam in the place of a camera makes of its pictures, and what it did."""
 
     def load(frame: int) -> np.ndarray:
-        with Image.open(pictures / _png_name(frame)) as picture:
+        file = pictures / _png_name(frame)
+        with open_picture(file, str(file)) as picture:
             return np.asarray(picture)
 
     sound = Sound(acted.samples, SOUND_RATE)

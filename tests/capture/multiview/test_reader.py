@@ -203,6 +203,14 @@ def test_pickled_points_are_refused(folder):
     fails(lambda: open_capture(folder).world_points(), "000000.npy", "damaged")
 
 
+def test_points_that_claim_more_than_their_file_has_are_refused(folder):
+    (folder / "points").mkdir()
+    file = folder / "points/000000.npy"
+    np.save(file, np.zeros((7, 3), np.float32))
+    file.write_bytes(file.read_bytes().replace(b"(7, 3), }      ", b"(70000000000,3)"))
+    fails(lambda: open_capture(folder).world_points(), "000000.npy", "damaged")
+
+
 @settings(max_examples=60)
 @given(data=st.data())
 def test_descriptions_cut_or_changed_anywhere_are_one_sentence(tmp_path_factory, data):

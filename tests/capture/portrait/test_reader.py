@@ -1,5 +1,7 @@
+import io
 import json
 import shutil
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +182,51 @@ def test_nan_blendshapes(folder):
 def test_pickled_arrays_are_refused(folder):
     np.save(folder / "bs.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     _fails(folder, "bs.npy", "cannot be read")
+
+
+def _npy(head: str, data: bytes = b"") -> bytes:
+    """A .npy file with any header."""
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head) + 1) + head.encode() + b"\n" + data
+
+
+def _shaped(descr: str, shape: str) -> str:
+    return f"{{'descr':{descr},'fortran_order':False,'shape':{shape}}}"
+
+
+def _npz() -> bytes:
+    out = io.BytesIO()
+    np.savez(out, a=np.zeros(3))
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        _npz(),
+        _npy(_shaped("'<f4'", "(100000000000,52)")),
+        _npy(_shaped("'<f4'", "(-1,52)"), bytes(624)),
+        _npy(_shaped("'<f4'", "()"), bytes(4)),
+        _npy(_shaped("'<U5'", "(22,52)"), bytes(20 * 22 * 52)),
+        _npy(_shaped("'<c8'", "(22,52)"), bytes(8 * 22 * 52)),
+        _npy(_shaped("[('a','<f4')]", "(22,)"), bytes(88)),
+        _npy("(" * 300 + ")" * 300),
+        b"",
+    ],
+)
+def test_strange_arrays_are_one_sentence(folder, data):
+    (folder / "bs.npy").write_bytes(data)
+    _fails(folder, "bs.npy")
+    (folder / "bs.npy").unlink()
+    (folder / "points.npy").write_bytes(data)
+    with pytest.raises(CaptureError, match=r"points\.npy"):
+        open_capture(folder).head_points()
+
+
+@pytest.mark.parametrize("names", [5, None, [[1]] * 52, "jawOpen"])
+def test_names_that_are_none_are_told(folder, names):
+    np.save(folder / "bs.npy", np.zeros((22, 52), np.float32))
+    (folder / "ico3d.json").write_text(json.dumps({"blendshape_names": names}))
+    _fails(folder, "ico3d.json", "blendshape_names")
 
 
 def test_damaged_json(folder):

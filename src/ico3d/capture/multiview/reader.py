@@ -13,6 +13,7 @@ from ico3d.capture.headpose.track_file import read_track
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import read_description
 from ico3d.capture.multiview.files import RecordedFiles
+from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface.head import head_hull
 from ico3d.common.camera import Camera
@@ -140,10 +141,7 @@ class MultiviewCapture(RecordedCapture):
         file = self.path / "points" / f"{self._index(frame):06d}.npy"
         if not file.is_file():
             return None
-        try:
-            points = np.load(file, allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise CaptureError(f"{file} is damaged: it is no array of numbers.") from error
+        points = read_numbers(file)
         if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
             raise CaptureError(f"{file} must hold (P, 3) floating-point numbers.")
         if not np.isfinite(points).all():

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from ico3d.capture.decoding import open_picture
+
 DETAILS = "ico3d.json"
 """File for data that have no place in the talking-portrait layout."""
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -85,5 +87,5 @@ def save_torso(path: Path, image: np.ndarray, torso: np.ndarray) -> None:
 
 def load_uint8(path: Path) -> np.ndarray:
     """A picture as uint8."""
-    with Image.open(path) as picture:
+    with open_picture(path, str(path)) as picture:
         return np.asarray(picture)

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from PIL import Image
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import EYE_NAMES, RecordedCapture, Sound, Split
-from ico3d.capture.decoding import DAMAGED, to_bytes, unit
+from ico3d.capture.decoding import DAMAGED, open_picture, to_bytes, unit
 from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
 from ico3d.capture.multiview.description import MOST_FRAMES, number, read_json
 from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
 from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
+from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface.first_points import unknown_person
 from ico3d.common.camera import Camera
@@ -109,7 +109,7 @@ class TalkingPortrait(RecordedCapture):
         file = self.path / "torso_imgs" / f"{frame}.png"
         if frame not in self._poses or not file.is_file():
             return None
-        with _reading(file, lambda: Image.open(file)) as picture:
+        with _reading(file, lambda: open_picture(file, str(file))) as picture:
             if picture.mode != "RGBA":
                 raise CaptureError(f"{file} has no opacity: it must be RGBA.")
             return _reading(file, lambda: np.asarray(picture, np.float32) / 255)
@@ -149,7 +149,10 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "points.npy"
         if not path.is_file():
             return unknown_person()
-        return _reading(path, lambda: np.load(path, allow_pickle=False))
+        points = read_numbers(path)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            raise CaptureError(f"{path} must hold (P, 3) finite numbers.")
+        return points
 
     @property
     def provenance(self) -> dict:
@@ -169,7 +172,7 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "bs.npy"
         if not path.is_file():
             return None
-        return np.asarray(_reading(path, lambda: np.load(path, allow_pickle=False)), np.float32)
+        return read_numbers(path).astype(np.float32)
 
     @cached_property
     def _action_units(self) -> dict[str, np.ndarray] | None:
@@ -203,10 +206,11 @@ class TalkingPortrait(RecordedCapture):
             return None
         from ico3d.capture.face.expressions import BLENDSHAPES
 
-        stated = tuple(self._details.get("blendshape_names", ()))
-        names = stated or BLENDSHAPES
-        columns = self._blendshapes.shape[-1]
-        if self._blendshapes.ndim != 2 or columns != len(names):
+        stated = self._details.get("blendshape_names", [])
+        if not isinstance(stated, list) or not all(isinstance(name, str) for name in stated):
+            raise CaptureError(f"{self.path / DETAILS}: blendshape_names must be a list of names.")
+        names = tuple(stated) or BLENDSHAPES
+        if self._blendshapes.ndim != 2 or self._blendshapes.shape[1] != len(names):
             raise CaptureError(
                 f"{self.path / 'bs.npy'}: expected {len(names)} columns, "
                 f"found shape {self._blendshapes.shape}."
@@ -220,7 +224,7 @@ class TalkingPortrait(RecordedCapture):
     def _camera(self, transforms: dict) -> Camera:
         """The steady camera; it is the world."""
         first = self._recorded(min(self._poses))
-        with _reading(first, lambda: Image.open(first)) as picture:
+        with _reading(first, lambda: open_picture(first, str(first))) as picture:
             width, height = picture.size
         file = self.path / "transforms_train.json"
         values = [transforms.get(k, d) for k, d in _lens_defaults(width, height)]
@@ -353,7 +357,7 @@ def _pose(path: Path, name: str, frame: dict) -> np.ndarray:
 def _picture(path: Path, *modes: str) -> np.ndarray:
     """A picture as uint8, in one of some modes of Pillow: as it is, or else in the first."""
     wanted = modes or ("RGB", "L")
-    with _reading(path, lambda: Image.open(path)) as opened:
+    with _reading(path, lambda: open_picture(path, str(path))) as opened:
         kept = opened.mode in wanted
         return _reading(path, lambda: np.asarray(opened if kept else opened.convert(wanted[0])))
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 from rich.console import Console
 from rich.progress import track as progress
 
 from ico3d.capture.capture import Sound
+from ico3d.capture.decoding import open_picture
 from ico3d.capture.face.mediapipe_face import (
     MESH_LANDMARKS,
     CanonicalFace,
@@ -134,7 +134,8 @@ def _aligned(
     """The rigid head through some frames, corrected by the pictures."""
 
     def grey(index: int) -> np.ndarray:
-        with Image.open(work / "ori_imgs" / f"{readings.frames[index]}.jpg") as picture:
+        file = work / "ori_imgs" / f"{readings.frames[index]}.jpg"
+        with open_picture(file, str(file)) as picture:
             return np.asarray(picture.convert("L"))
 
     with console.status("aligning the poses with the pictures"):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from ico3d.capture.decoding import FORMATS
 from ico3d.capture.video import Video, open_video, read_sound
 from ico3d.creating.looking.advice import Advice, spans_of
 from ico3d.creating.looking.picture_checks import picture_advice
@@ -14,6 +15,8 @@ from ico3d.creating.looking.samples import sampled
 from ico3d.creating.looking.sound_checks import sound_advice
 from ico3d.errors import CaptureError
 
+PHOTOGRAPHS = (*FORMATS, "WEBP", "GIF", "BMP", "TIFF")
+"""Kinds of pictures that are told from videos before one is opened, by Pillow's names."""
 LEAST_SECONDS, FEW_SECONDS = 3.0, 20.0
 """Length of a video that is too short to learn from, and of one that is short."""
 SLOW = 20.0
@@ -79,7 +82,7 @@ def refuse_photograph(path: Path) -> None:
         CaptureError: If the file is a picture.
     """
     try:
-        with Image.open(path):
+        with Image.open(path, formats=PHOTOGRAPHS):
             pass
     except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError):
         return  # no picture that Pillow knows

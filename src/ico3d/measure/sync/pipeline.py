@@ -11,7 +11,7 @@ from PIL import Image
 from torch import Tensor
 
 from ico3d.capture.capture import Sound
-from ico3d.capture.decoding import to_bytes
+from ico3d.capture.decoding import open_picture, to_bytes
 from ico3d.capture.sound import mono
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError, MissingModelError
@@ -137,7 +137,7 @@ def _scores(
         raise CaptureError(f"only {len(heard) / RATE:.2f} s of sound belong to the face.")
     crops = Crops(track)
     face = (
-        crops.cut(np.asarray(Image.open(io.BytesIO(pictures[track.first + place]))), place)
+        crops.cut(np.asarray(open_picture(pictures[track.first + place], "a face")), place)
         for place in range(count + FRAMES - 1)
     )
     samples = np.clip(heard * 32768, -32768, 32767).round().astype(np.int16)

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from PIL import Image
 
+from ico3d.capture.decoding import open_picture
 from ico3d.errors import CaptureError, MissingExtraError
 
 DECIMETRE = 0.1
@@ -142,7 +142,8 @@ def in_mouth(folder: Path, uv: np.ndarray) -> np.ndarray:
 
     The package's map of body parts tells.
     """
-    with Image.open(folder / "segmentation" / "body_parts_segmentation.png") as image:
+    file = folder / "segmentation" / "body_parts_segmentation.png"
+    with open_picture(file, str(file)) as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
     height, width = pixels.shape[:2]
     column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)

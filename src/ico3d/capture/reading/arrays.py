@@ -1,0 +1,39 @@
+"""Reads arrays of numbers from files that may be anybody's."""
+
+from pathlib import Path
+from tokenize import TokenError
+
+import numpy as np
+
+from ico3d.errors import CaptureError
+
+UNREADABLE = (
+    OSError,
+    ValueError,
+    TypeError,
+    SyntaxError,
+    TokenError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    RecursionError,
+)
+"""What NumPy raises for files whose header is damaged or claims more than the file has."""
+
+
+def read_numbers(file: Path) -> np.ndarray:
+    """The array in a .npy file.
+
+    Raises:
+        CaptureError: If the file holds none, or one of anything but real numbers.
+    """
+    try:
+        # Mapped, an array cannot claim more memory than the file has.
+        mapped = np.load(file, mmap_mode="r", allow_pickle=False)
+    except UNREADABLE as error:
+        raise CaptureError(
+            f"{file} is damaged and cannot be read: it is no array of numbers."
+        ) from error
+    if not isinstance(mapped, np.ndarray) or mapped.dtype.kind not in "fiu":
+        raise CaptureError(f"{file} is damaged and cannot be read: it holds no array of numbers.")
+    return np.array(mapped)

@@ -1,0 +1,86 @@
+"""Pictures of anybody: of two kinds, of bounded size, by one function."""
+
+import json
+import re
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import EpsImagePlugin, Image, ImageFile
+
+import ico3d
+from ico3d.capture.decoding import MOST_SIDE, decoded, has_opacity, open_picture, size_of
+from ico3d.capture.formats import open_capture
+from ico3d.errors import CaptureError
+from ico3d.measure.comparison import pictures_of
+
+EPS = (
+    b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 64 64\n%%EndComments\n"
+    b"(/etc/passwd) (r) file pop\nshowpage\n%%EOF\n"
+)
+
+
+@pytest.fixture(autouse=True)
+def no_program(monkeypatch):
+    """Fails where Pillow would start Ghostscript."""
+    monkeypatch.setattr(EpsImagePlugin, "Ghostscript", lambda *_: pytest.fail("gs was started"))
+
+
+def png(width, height):
+    """The beginning of a PNG picture that claims a size."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
+    body = b"IDAT" + zlib.compress(bytes(99))
+    chunks = (
+        struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in (head, body)
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def test_no_program_is_started_for_a_picture(tmp_path):
+    file = tmp_path / "000000.jpg"
+    file.write_bytes(EPS)
+    for source in (file, EPS):
+        for read in (decoded, size_of, has_opacity):
+            with pytest.raises(CaptureError, match=r"^picture is damaged and cannot be decoded\.$"):
+                read(source, "picture")
+    with pytest.raises(CaptureError, match="cannot be read as a picture"):
+        next(pictures_of(tmp_path, 25.0))
+
+
+def test_no_program_is_started_for_a_picture_of_a_portrait(tmp_path):
+    (tmp_path / "ori_imgs").mkdir()
+    (tmp_path / "ori_imgs" / "0.jpg").write_bytes(EPS)
+    frame = {"img_id": 0, "aud_id": 0, "transform_matrix": np.eye(4).tolist()}
+    for name, frames in (("train", [frame]), ("val", [])):
+        about = {"focal_len": 60, "cx": 32, "cy": 32, "frames": frames}
+        (tmp_path / f"transforms_{name}.json").write_text(json.dumps(about))
+    with pytest.raises(CaptureError, match="cannot be read"):
+        open_capture(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["TIFF", "BMP", "GIF", "WEBP", "ICO"])
+def test_kinds_that_no_layout_has_are_refused(tmp_path, kind):
+    Image.new("RGB", (32, 32)).save(tmp_path / "a.png", kind)
+    with pytest.raises(CaptureError, match="cannot be decoded"):
+        decoded(tmp_path / "a.png", "picture")
+
+
+@pytest.mark.parametrize(
+    "size", [(6000, 5900), (13_300, 13_400), (60_000, 60_000), (MOST_SIDE + 1, 1)]
+)
+@pytest.mark.filterwarnings("ignore::PIL.Image.DecompressionBombWarning")
+def test_pictures_larger_than_cameras_make_are_refused_by_their_header(monkeypatch, size):
+    monkeypatch.setattr(ImageFile.ImageFile, "load", lambda _: pytest.fail("decoded"))
+    for read in (decoded, size_of):
+        with pytest.raises(CaptureError, match="larger than is taken"):
+            read(png(*size), "picture")
+    assert open_picture(png(MOST_SIDE, 1), "picture").size == (MOST_SIDE, 1)
+
+
+def test_pictures_are_opened_in_kinds_that_are_named():
+    """Pillow tries all that it knows otherwise."""
+    for file in Path(ico3d.__file__).parent.rglob("*.py"):
+        calls = re.findall(r"\bImage\.open\((.*)", file.read_text("utf-8"))
+        assert all("formats=" in call for call in calls), file
