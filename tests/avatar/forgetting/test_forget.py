@@ -14,8 +14,8 @@ from ico3d.bundle.format import write_bundle
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
 from support.bundles.random_bundle import random_files, random_head, random_manifest
-from support.nested import nested
 from support.recordings.multiview_folders import entry, ring, write_cameras
+from support.strangers.nested import nested
 
 
 def recording(folder: Path, **stated: str) -> Path:

@@ -2,7 +2,7 @@
 
 from ico3d.avatar.embodying.look import Look
 from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice, write_choice
-from support.not_ours import replacements
+from support.strangers.not_ours import replacements
 
 
 def test_what_lies_elsewhere_is_no_choice(tmp_path):

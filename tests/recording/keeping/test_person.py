@@ -8,7 +8,7 @@ import pytest
 from ico3d.recording.keeping import person as room
 from ico3d.recording.keeping.containers import suffix_of
 from ico3d.recording.refusals import Refused
-from support.not_ours import replacements
+from support.strangers.not_ours import replacements
 from support.studio_page.parts import begun, kept
 
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)

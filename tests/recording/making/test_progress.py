@@ -16,7 +16,7 @@ from ico3d.recording.making.progress import (
     read_progress,
     write_progress,
 )
-from support.not_ours import replacements
+from support.strangers.not_ours import replacements
 
 ADVICE = (Advice("blur", spans=((2, 3),)), Advice("face-none", "refused"))
 BLUR = {"code": "blur", "level": "better", "values": {}, "spans": [[2, 3]], "detail": ""}

@@ -16,7 +16,7 @@ from ico3d.training.listing.find_runs import find_runs
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.notes.state import carried_out, note
 from ico3d.training.run import BEFORE, CHECKPOINT, RunFolder
-from support.nested import nested
+from support.strangers.nested import nested
 from training.walk import Walk
 
 LOOP = LoopSettings(steps=20, log_every=5, checkpoint_every=4)
