@@ -18,3 +18,8 @@ def test_long_arguments_are_left_out_and_no_call_is_lost():
     assert json.loads(tool_call("note", fitting).arguments) == fitting
     longer = tool_call("n" * 300, {"text": fitting["text"] + "x"})
     assert longer.arguments == "{}" and isinstance(decode_server(encode(longer)), Call)
+
+
+def test_halves_of_characters_lose_no_call():
+    call = decode_server(encode(tool_call("mo\ud83d", {"name": "\ud83d"})))
+    assert call == Call("mo\ufffd", '{"name": "\ufffd"}')

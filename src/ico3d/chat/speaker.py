@@ -30,6 +30,7 @@ from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.playback import Playback
 from ico3d.chat.turns.echo import SentSound
+from ico3d.chat.wire.characters import sendable
 from ico3d.chat.wire.marks import LONGEST_NAME
 from ico3d.chat.wire.protocol import (
     MAX_ARGUMENTS,
@@ -204,5 +205,5 @@ class Speaker(FrameProcessor):
 
 def tool_call(name: str, arguments: Mapping[str, Any]) -> Call:
     """What the page is told of a function that the language model calls."""
-    text = json.dumps(arguments, ensure_ascii=False, default=str)
-    return Call(name[:LONGEST_NAME], text if len(text) <= MAX_ARGUMENTS else "{}")
+    text = sendable(json.dumps(arguments, ensure_ascii=False, default=str))
+    return Call(sendable(name)[:LONGEST_NAME], text if len(text) <= MAX_ARGUMENTS else "{}")

@@ -114,6 +114,10 @@ class House:
         async def big(size: int):
             return Response("x" * size, media_type="text/plain")
 
+        @app.get("/halves")
+        async def halves():
+            return Response('{"a": "\\ud83d"}', media_type="application/json")
+
         @app.get("/slow")
         async def slow():
             await asyncio.sleep(5)
@@ -159,6 +163,11 @@ async def test_parameters_go_into_path_query_or_body():
     assert query == {"b": "2", "c": '[true, "ü"]'}
     assert rooms.seen[1] == ("/echo/", {}, values)
     assert rooms.seen[2][1] == {"q": "a&b=c+d %20#ü"}
+
+
+async def test_halves_of_characters_do_not_come_in():
+    async with house() as (_, call):
+        assert await call("/halves") == {"status": 200, "body": {"a": "\ufffd"}}
 
 
 async def test_arguments_that_do_not_fit_are_not_sent():

@@ -20,6 +20,7 @@ from pipecat.services.llm_service import FunctionCallParams
 from ico3d.chat.settings.headers import blanked, filled_in
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools.http import MOST_BYTES
+from ico3d.chat.wire.characters import sendable
 from ico3d.errors import Ico3dError
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ class Connection:
             if is_lost(error):
                 await self.close()
             return {"error": f"{name} failed: {self.told(error)}."}
-        text = blanked(text_of(result), self.server.secrets, self.server.where)
+        text = blanked(sendable(text_of(result)), self.server.secrets, self.server.where)
         if len(text.encode()) > MOST_BYTES:
             return {"error": f"{name} failed: its answer has more than {MOST_BYTES} bytes."}
         if result.is_error:

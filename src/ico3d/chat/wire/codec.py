@@ -50,11 +50,15 @@ def encode(message: ClientMessage | ServerMessage) -> str | bytes:
     check_header(kind, header, name)
     header = {"type": name, **header}
     text = json.dumps(header, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    try:
+        coded = text.encode()
+    except UnicodeError as error:
+        raise ProtocolError(f"{name}: half of a character is no text.") from error
     if not arrays:
-        check_size(text.encode(), protocol.MAX_TEXT_FRAME)
+        check_size(coded, protocol.MAX_TEXT_FRAME)
         return text
     payload = [array.tobytes() for array in arrays.values()]
-    frame = b"".join([HEADER_LENGTH.pack(len(text.encode())), text.encode(), *payload])
+    frame = b"".join([HEADER_LENGTH.pack(len(coded)), coded, *payload])
     check_size(frame, protocol.MAX_BINARY_FRAME)
     return frame
 

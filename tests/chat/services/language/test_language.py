@@ -184,6 +184,14 @@ async def test_a_model_that_only_calls_functions_is_made_to_speak(bundle):
     assert offered == 2 * [*[True] * MOST_ROUNDS, False], "each turn anew"
 
 
+async def test_halves_of_characters_in_a_call_silence_nobody(bundle):
+    mood = Call("mood", {"name": "\ud83d"})
+    script = Script(lambda body: [mood] if len(script.requests) == 1 else ["Well."])
+    async with talking(bundle, script) as page:
+        assert await ask(page, "hi", 0) == ["Well."]
+        assert await ask(page, "hi", 1) == ["Well."]
+
+
 async def test_a_model_that_calls_what_it_was_not_offered_is_not_obeyed(bundle):
     script = Script(lambda body: [Call("mood", {"name": "happy"})])
     async with talking(bundle, script) as page:

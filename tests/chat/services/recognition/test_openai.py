@@ -8,7 +8,7 @@ import wave
 
 import pytest
 import uvicorn
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.responses import JSONResponse
 
 from ico3d.chat.services.recognition.openai import Settings, hindrance, make
@@ -39,6 +39,8 @@ async def transcribing():
         if form["model"] in ("500", "401"):
             return JSONResponse({"error": {"message": "sorry"}}, int(form["model"]))
         file = await form["file"].read()
+        if form["model"] == "halves":
+            return Response('{"text": "a\\ud83d."}', media_type="application/json")
         return {"text": "" if form["model"] == "deaf" else described(file, form, request)}
 
     listener = server.bind("127.0.0.1", 0)
@@ -73,6 +75,12 @@ async def test_silence_is_a_blank_transcript():
     async with transcribing() as (url, _):
         (frame,), errors = await listen(make(Settings(url, "deaf"), NOBODY), noise())
         assert frame.text == BLANK and frame.finalized and not errors
+
+
+async def test_halves_of_characters_go_no_further():
+    async with transcribing() as (url, _):
+        (frame,), errors = await listen(make(Settings(url, "halves"), NOBODY), noise())
+        assert frame.text == "a\ufffd." and not errors
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import AsyncGenerator, Sequence
 from contextvars import ContextVar
+from dataclasses import replace
 from typing import Any
 
 from loguru import logger
@@ -19,6 +20,7 @@ from ico3d.chat.observing.failures import cause
 from ico3d.chat.pipecat_internals import push_text
 from ico3d.chat.services.language.reasoning import Parts, Thoughts, field_of, without_thoughts
 from ico3d.chat.settings.keys import is_openai
+from ico3d.chat.wire.characters import sendable, sendable_json
 
 MOST_ROUNDS = 4
 """How often a model may call functions in one turn before it must answer in words."""
@@ -103,7 +105,17 @@ class CompatibleModel(OpenAILLMService):
             return
         if len(function_calls) > MOST_CALLS:
             logger.warning(f"language called {len(function_calls)} functions; {MOST_CALLS} are run")
-        await super().run_function_calls(function_calls[:MOST_CALLS])
+        await super().run_function_calls(
+            [
+                replace(
+                    call,
+                    function_name=sendable(call.function_name),
+                    tool_call_id=sendable_json(call.tool_call_id),
+                    arguments=sendable_json(call.arguments),
+                )
+                for call in function_calls[:MOST_CALLS]
+            ]
+        )
 
     # type: ignore (whoever reads the stream asks it for no more than chunks)
     async def get_chat_completions(
@@ -199,11 +211,6 @@ async def _closing(
             yield chunk
     finally:
         await stream.close()
-
-
-def sendable(text: str) -> str:
-    """A text without halves of characters, which JSON can hold and nothing can send on."""
-    return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def rounds(messages: list[dict[str, Any]]) -> int:

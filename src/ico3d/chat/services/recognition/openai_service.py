@@ -13,6 +13,7 @@ from ico3d.chat.pipecat_internals import client_of
 from ico3d.chat.services.client import client_options
 from ico3d.chat.services.recognition.openai_settings import WHERE, Settings
 from ico3d.chat.services.recognition.segments import Segments
+from ico3d.chat.wire.characters import sendable
 
 
 class Transcriptions(OpenAISTTService):
@@ -51,7 +52,7 @@ class Transcriptions(OpenAISTTService):
             raise ConnectionError(sentence) from None
         except OpenAIError as error:
             raise ConnectionError(f"{place} gave no transcript: {error}") from error
-        yield TranscriptionFrame(answer.text, "", time_now_iso8601(), result=answer)
+        yield TranscriptionFrame(sendable(answer.text), "", time_now_iso8601(), result=answer)
 
 
 class OpenAIRecognition(Segments, Transcriptions):
