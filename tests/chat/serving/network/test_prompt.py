@@ -26,7 +26,7 @@ async def port(body):
 
 @pytest.fixture
 async def unread(tmp_path):
-    """A server of a file that is too long for nobody to read it, and of a question's length.
+    """A server of a file too long to be sent unread, of a body's length, and of no answer.
 
     Yields its port and its tasks.
     """
@@ -39,6 +39,11 @@ async def unread(tmp_path):
     @app.post("/length")
     async def length(request: Request):
         return len(await request.body())
+
+    @app.get("/nothing")
+    async def nothing(request: Request):
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
 
     async with running(app) as (served, listener):
         yield listener.getsockname()[1], served.server_state.tasks
@@ -121,6 +126,15 @@ async def test_behind_an_answer_that_is_not_read_not_much_may_wait(unread, behin
     writer.write(behind)
     assert await seconds_until_over(tasks) < 2
     writer.transport.abort()
+
+
+async def test_who_leaves_while_a_request_waits_is_not_worked_for(unread):
+    port, tasks = unread
+    async with connected(port) as (_, writer):
+        writer.write((b"GET /nothing" + HOST + b"\r\n") * 2)
+        while not tasks:
+            await asyncio.sleep(0.01)
+    assert await seconds_until_over(tasks) < 2
 
 
 async def test_one_request_may_wait_for_another(port):

@@ -10,7 +10,7 @@ import resource
 from collections import Counter
 from typing import NoReturn
 
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
 from ico3d.chat.serving.crowd import machine_of
 from ico3d.errors import ProtocolError
@@ -39,15 +39,19 @@ class PromptProtocol(HttpToolsProtocol):
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
+        self._first: RequestResponseCycle | None = None  # that another one may wait for
         if count_in(self._machine):
             self._await_head()
         else:
             transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forgets the connection."""
+        """Forgets the connection; a request with another one behind it is told, too."""
         self._stop_waiting()
         self._uncount()
+        if self._first is not None:
+            self._first.disconnected = True
+            self._first.message_event.set()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -81,7 +85,9 @@ class PromptProtocol(HttpToolsProtocol):
         """The head of a request has arrived."""
         self._stop_waiting()
         self._head_bytes = 0
+        before = self.cycle
         super().on_headers_complete()
+        self._first = before if self.pipeline else self.cycle
 
     def on_body(self, body: bytes) -> None:
         """A piece of a request's body has arrived."""
