@@ -122,7 +122,8 @@ def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
     waiting = [os.fspath(folder)]
     while waiting:
         place = waiting.pop()
-        folders, files = [], []
+        folders: list[str] = []
+        files: list[str] = []
         try:
             with os.scandir(place) as entries:
                 for entry in entries:
@@ -136,7 +137,7 @@ def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
         ]
 
 
-def _is_folder(entry: os.DirEntry) -> bool:
+def _is_folder(entry: os.DirEntry[str]) -> bool:
     """Whether an entry is a folder, or a link to one; a link in a circle is none."""
     try:
         return entry.is_dir()
