@@ -167,8 +167,8 @@ def test_forgetting_a_person_forgets_the_voice(settings, fake, monkeypatch, tmp_
     _, _, kept = cloned(settings)
     monkeypatch.chdir(tmp_path)
     assert kept == KEPT and main(["forget", "Ada", "--yes"]) == 0
-    assert "ada.work/voice: a cloned voice of ada" in capsys.readouterr().out
-    assert not (tmp_path / "ada.work/voice").exists()
+    assert "ada.work: a workplace, a cloned voice of ada" in capsys.readouterr().out
+    assert not (tmp_path / "ada.work").exists()
 
 
 def test_the_bundle_is_given_it(settings, fake, tmp_path):

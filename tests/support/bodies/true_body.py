@@ -54,7 +54,9 @@ def still_body(capture: MovingCapture, folder: Path, about=ABOUT, frame=0) -> Tr
     """A saved body that stands as it does at one frame."""
     values = _values(capture) | {"means": torch.from_numpy(capture.world_points(frame)).float()}
     model = WindowModel(Still(), values, {})
-    save_window(folder / f"{about}.safetensors", model)
+    files = [f"{about}-{number}.safetensors" for number in range(len(WINDOWS))]
+    for file in files:
+        save_window(folder / file, model)
     body = TrainedBody([model, model], WINDOWS, capture.fps, "static", {"train_seconds": 7.0})
-    body.save(folder, [f"{about}.safetensors"] * 2, about)
+    body.save(folder, files, about)
     return body

