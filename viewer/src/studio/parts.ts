@@ -2,6 +2,9 @@ import type { PageWords } from '../words/page-words.ts';
 import { say } from '../words/text.ts';
 import { partName, type Part } from './recordings.ts';
 
+/** The part that is a video which somebody brought instead of recording. */
+export const UPLOAD = 'upload';
+
 /**
  * Shows the list of parts: each is chosen by pressing it, and none but the consent before that is kept.
  *
@@ -34,5 +37,5 @@ export function isAgreed(parts: readonly Part[]): boolean {
 
 /** Whether a part is listed: a video that was brought only if there is one. */
 function isListed({ id, state }: Part): boolean {
-  return id !== 'upload' || state !== 'missing';
+  return id !== UPLOAD || state !== 'missing';
 }

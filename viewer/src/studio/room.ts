@@ -5,7 +5,7 @@ import { showAdvice } from './advice.ts';
 import { Camera } from './camera.ts';
 import { Bodies, type BodyPorts } from './bodies.ts';
 import { showMeters, soundsOf } from './meters.ts';
-import { isAgreed, showParts } from './parts.ts';
+import { isAgreed, showParts, UPLOAD } from './parts.ts';
 import type { Overview, Part, Status, Told, Turns } from './recordings.ts';
 import { Sending } from './sending.ts';
 
@@ -13,7 +13,6 @@ const LOOKED = 400; // ms between two pictures for guidance
 const SHOWN = 250; // ms between two of the clock's
 const LONGEST = 60; // s of a part, after which it stops by itself
 const SLICE = 4 << 20; // bytes of a video that are sent at once
-const UPLOAD = 'upload';
 
 /** What the view of a person's recording needs of the page around it. */
 export interface RoomPorts extends BodyPorts {
@@ -150,7 +149,7 @@ export class Room {
     this.sending = null;
     try {
       const status = await this.saved(sending);
-      if (this.status?.name !== status.name) return; // the page was left for another one
+      if (this.status?.name !== status.name) return this.write(); // the page was left for another one
       this.ports.changed(status);
       if (this.part?.advice?.length === 0) this.advance(); // else it is read first
     } catch (error) {
