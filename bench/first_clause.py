@@ -32,8 +32,8 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from pipecat.workers.runner import WorkerRunner
 
 from ico3d.chat.services.voice import espeak
+from ico3d.chat.services.voice.base import PieceVoice
 from ico3d.chat.services.voice.clauses import ClauseProcessor
-from ico3d.chat.services.voice.pieces import PieceVoice
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.cli import run_script
 

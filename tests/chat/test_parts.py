@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from ico3d.chat.frames import SpeechFrame, Utterances
 from ico3d.chat.page import MAX_WAITING, Outbox, Page
-from ico3d.chat.performing.face import LEAST, MOST, ROW, Face, Sentence
+from ico3d.chat.performing.face import ROW, Face
+from ico3d.chat.performing.sentence import LEAST, MOST, Sentence
 from ico3d.chat.playback import Playback
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.provider import Context, Provider

@@ -5,11 +5,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ico3d.bundle.manifest import BodyInfo, WindowInfo
-from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
+from ico3d.bundle.tensors import QUAT_UNIT, Spec, decode_tensors, encode_tensors
 from ico3d.errors import BundleError
 
-QUAT_UNIT = 32767
-"""Integer that represents 1 in `BakedWindow.quats`."""
 _MAX_LENGTH = 1e4
 """Metres; anything farther is no person, and overflows when it is squared in a shader."""
 LEAST_SCALE = 1e-6

@@ -18,6 +18,8 @@ _DTYPES = {
     "U8": np.dtype("u1"),
 }
 _MAX_HEADER_BYTES = 1 << 16
+QUAT_UNIT = 32767
+"""The int16 that stands for 1 in quaternions."""
 
 Spec = Mapping[str, tuple[str, tuple[int, ...]]]
 """For each tensor that a file must hold, by name: safetensors dtype and shape."""

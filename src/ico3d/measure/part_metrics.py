@@ -17,6 +17,9 @@ FEWEST_MOVING = 50
 A single moving pixel already makes 49 pixels count as moving.
 """
 
+MOUTH_BOX = 1.5
+"""Size of the box in which the mouth is judged, times that of the mouth's landmarks."""
+
 
 def moving_pixels(picture: np.ndarray, neighbours: Sequence[np.ndarray]) -> np.ndarray:
     """Pixels that differ from the frame before or after, and those near them.
@@ -53,7 +56,7 @@ def psnr_moving(predicted: np.ndarray, truth: np.ndarray, weight: np.ndarray) ->
 
 
 def mouth_box(landmarks: np.ndarray, height: int, width: int) -> tuple[slice, slice] | None:
-    """The box around the mouth's landmarks, enlarged by half about its centre.
+    """The box around the mouth's landmarks, enlarged by `MOUTH_BOX` about its centre.
 
     Args:
         landmarks: (68, 2) pixels.
@@ -65,7 +68,7 @@ def mouth_box(landmarks: np.ndarray, height: int, width: int) -> tuple[slice, sl
     """
     mouth = landmarks[MOUTH]
     low, high = mouth.min(0), mouth.max(0)
-    middle, half = (low + high) / 2, (high - low) / 2 * 1.5
+    middle, half = (low + high) / 2, (high - low) / 2 * MOUTH_BOX
     first = np.floor(np.maximum(middle - half, 0)).astype(int)
     last = np.ceil(np.minimum(middle + half, (width, height))).astype(int)
     if (last <= first).any():

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.bundle.skinned.baked import QUAT_UNIT
 from ico3d.bundle.skinned.packing import packed_rotations, packed_weights
 from ico3d.bundle.skinned.posing import (
     any_pose,
@@ -17,6 +16,7 @@ from ico3d.bundle.skinned.posing import (
     posed,
     recorded_pose,
 )
+from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.rig.quaternions import from_rotvec, multiply, normalized, rotate, to_rotvec
 from support.bundles.random_skinned import random_skinned
 

@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST, SkinnedInfo
 from ico3d.bundle.skinned.lamp import BakedLamp, fault_of, lamp_spec
 from ico3d.bundle.tensors import (
+    QUAT_UNIT,
     Axes,
     Spec,
     decode_tensors,
@@ -18,8 +19,6 @@ from ico3d.bundle.tensors import (
 from ico3d.errors import BundleError
 from ico3d.rig.rig import Rig
 
-QUAT_UNIT = 32767
-"""The int16 that stands for 1 in quaternions."""
 WEIGHT_UNIT = 255
 """Sum of a Gaussian's four weights."""
 SCALE_UNITS = (1e-3, 1.0)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ico3d.bundle.skinned.baked import QUAT_UNIT, WEIGHT_UNIT
+from ico3d.bundle.skinned.baked import WEIGHT_UNIT
+from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.rig.quaternions import Array, continuous, normalized
 
 

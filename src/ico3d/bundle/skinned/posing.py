@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.bundle.skinned.baked import QUAT_UNIT, SCALE_UNITS, WEIGHT_UNIT, BakedSkinned
+from ico3d.bundle.skinned.baked import SCALE_UNITS, WEIGHT_UNIT, BakedSkinned
 from ico3d.bundle.skinned.lamp import lamp_light
+from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.rig.quaternions import Array, multiply, normalized, slerp
 
 _FIRST = 0.4886025119029199

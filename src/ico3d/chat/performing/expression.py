@@ -19,7 +19,8 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from pipecat.utils.text.base_text_aggregator import TextType
 
 from ico3d.chat.frames import PhonemesFrame, SpeechFrame, UtteranceEndFrame, Utterances
-from ico3d.chat.performing.face import MOST, ROW, Face, Piece, Sentence
+from ico3d.chat.performing.face import ROW, Face
+from ico3d.chat.performing.sentence import MOST, Piece, Sentence
 from ico3d.chat.wire.protocol import EXPRESSION_FPS
 from ico3d.chat.workers import Run, at_once
 

@@ -11,10 +11,11 @@ from ico3d.avatar.embodying.builds.reshape import STRETCH, gestures_in, reshaped
 from ico3d.avatar.embodying.surfaces import main_joints
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.packaged import FILE
-from ico3d.bundle.skinned.baked import QUAT_UNIT, BakedSkinned
+from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.bundle.skinned.posing import posed, recorded_pose
+from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.errors import BundleError
 from ico3d.motion.roles import INDEX
 from ico3d.rig.quaternions import normalized, to_matrix

@@ -10,7 +10,7 @@ from ico3d.bundle.persona import Persona
 from ico3d.chat.services import chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
-from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.base import STARVED
 from ico3d.chat.settings.conversation import Choice
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.espeak import synthesize

@@ -11,11 +11,12 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.skinning import coefficients
 from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.bundle.limits import MAX_KNOWN_POSES
-from ico3d.bundle.skinned.baked import QUAT_UNIT, SCALE_UNITS, BakedSkinned
+from ico3d.bundle.skinned.baked import SCALE_UNITS, BakedSkinned
 from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
 from ico3d.bundle.skinned.posing import kernel_width
+from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.common.spread import spread
 
 STILL = 0.05

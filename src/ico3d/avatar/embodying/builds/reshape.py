@@ -7,9 +7,10 @@ import numpy as np
 
 from ico3d.avatar.embodying.builds.change import Change, change_to
 from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
-from ico3d.bundle.skinned.baked import QUAT_UNIT, BakedSkinned
+from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
+from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.motion.recorded.cut import Cut
 from ico3d.rig.quaternions import from_matrix, normalized, to_matrix
 

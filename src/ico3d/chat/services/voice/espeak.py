@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_package
-from ico3d.chat.services.voice.pieces import PieceVoice, Spoken, at_speech_rate
+from ico3d.chat.services.voice.base import PieceVoice, Spoken, at_speech_rate
 from ico3d.common.espeak import synthesize
 
 VARIANT = "+f3"

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.voice.base import LOADING, PieceVoice, Spoken, at_speech_rate
 from ico3d.chat.services.voice.phonemes import timed
-from ico3d.chat.services.voice.pieces import LOADING, PieceVoice, Spoken, at_speech_rate
 from ico3d.errors import MissingExtraError, SettingsError
 
 SHA256 = "5f70741d4e900f4e85d0037498736cc1b3e1b9a63a13546a5da1e63abf4fccd8"

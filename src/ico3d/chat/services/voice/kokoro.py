@@ -9,7 +9,7 @@ from pipecat.audio.utils import create_stream_resampler
 from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.services.provider import Context, lacks_package, lacks_weights
-from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.chat.services.voice.base import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingExtraError, SettingsError
 

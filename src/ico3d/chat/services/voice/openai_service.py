@@ -9,8 +9,8 @@ from pipecat.services.openai.tts import OpenAITTSService
 
 from ico3d.chat.pipecat_internals import audio_frames, client_of, use_resampler
 from ico3d.chat.services.client import client_options
+from ico3d.chat.services.voice.base import OPTIONS, Prompt
 from ico3d.chat.services.voice.openai_settings import WHERE, Settings
-from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.sound import REQUEST, Claim, fault, wav_claim
 from ico3d.errors import ServiceError

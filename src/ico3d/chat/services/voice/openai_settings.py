@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.base import STARVED
 from ico3d.chat.settings.keys import check_key
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import SettingsError

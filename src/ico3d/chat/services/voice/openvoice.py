@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_weights
+from ico3d.chat.services.voice.base import LOADING, PieceVoice, Spoken, at_speech_rate
 from ico3d.chat.services.voice.cloning import Recording, permitted_recording
-from ico3d.chat.services.voice.pieces import LOADING, PieceVoice, Spoken, at_speech_rate
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
 
