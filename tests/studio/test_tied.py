@@ -11,7 +11,7 @@ TIE = np.array([0.0, 0.01, -0.1])
 
 
 def _roots(count=2000):
-    ways = np.random.default_rng(0).normal(size=(count, 3)) + [0, 0.8, 0.4]
+    ways = np.random.default_rng(0).normal((0, 0.8, 0.4), size=(count, 3))
     ways[:, 1] = np.abs(ways[:, 1])
     return 0.09 * unit(ways)
 
