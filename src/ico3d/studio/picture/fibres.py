@@ -47,7 +47,7 @@ def lit_strands(points, first, open_, tone, colors, centre, camera, lights):
     seen = np.zeros(3)
     for s in range(first.shape[0] - 1):
         begin, end = first[s], first[s + 1]
-        shift = 0.05 * math.sin(12.9898 * s)
+        shift = 0.03 * math.sin(12.9898 * s)
         red, green, blue = colors[s, 0] * tone[s], colors[s, 1] * tone[s], colors[s, 2] * tone[s]
         for m in range(begin, end):
             before, after = max(begin, m - 1), min(end - 1, m + 1)

@@ -62,7 +62,7 @@ def skin_at(colors, channels, x, y, z, pixel):
         r, g, b = r * (1.0 - 0.50 * shadow), g * (1.0 - 0.42 * shadow), b * (1.0 - 0.32 * shadow)
     roots = 0.0
     if scalp > 0.0:
-        roots = min(1.0, 0.95 * scalp * (0.85 + 0.3 * noise(x / 0.0011, y / 0.0011, z / 0.0011)))
+        roots = min(1.0, 0.95 * scalp * (0.96 + 0.08 * noise(x / 0.0011, y / 0.0011, z / 0.0011)))
         r += (0.7 * colors.hair[0] - r) * roots
         g += (0.7 * colors.hair[1] - g) * roots
         b += (0.7 * colors.hair[2] - b) * roots

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ico3d.studio.person.growing import face, styles
+from ico3d.studio.person.growing import face, styles, tied, wisps
 from ico3d.studio.person.growing.skull import Skull, skull_of
 from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import Strands, bound, joined
@@ -18,10 +18,14 @@ LOOSE = 20000
 """Strands of long hair that falls on the shoulders."""
 TAIL = 3600
 """Strands in a tail."""
+BABY_HAIRS, FLYAWAYS, WISP = 2600, 420, 16
+"""Short hairs at the hairline of tied hair, strands that leave its surface, strands of a wisp."""
 RADIUS = 0.00013
 """Half of a strand's thickness in metres: thicker than real hair, which is more numerous."""
 EDGE = 0.015
 """Metres over which the hairline thins out: the strands there are fewer and finer."""
+GAP = 0.0008
+"""Half of the width of the parting, metres."""
 AWAY = 0.03
 """Hair farther than this from the skin hangs in a tail, metres."""
 
@@ -51,20 +55,21 @@ def with_hair(subject: Subject, loose: bool = False) -> Subject:
         return subject
     random = np.random.default_rng(7)
     count = SHORT if subject.male and not loose else LOOSE if loose else LONG
-    corners, parts = _roots(subject, skull, count, random)
+    corners, parts = _roots(subject, skull, count, not (loose or subject.male), random)
     roots = np.einsum("nk,nkc->nc", parts, subject.vertices[corners])
     grown = []
     if loose:
         paths = styles.loose(skull, roots, _skin_and_cloth(subject), random)
     elif not subject.male:
         line, width = _tail_line(subject, skull)
-        paths = styles.tied(skull, roots, line[0], random)
-        hanging = styles.tail(line, width, TAIL, random)
+        paths = tied.tied(skull, roots, line[0], random)
+        hanging = tied.tail(line, width, TAIL, random)
         near = np.argsort(np.linalg.norm(roots - line[0], axis=1))[:300]
         where = random.choice(near, TAIL)
         grown.append(
             _of(subject, corners[where], parts[where], hanging, np.full(TAIL, 1.0), random)
         )
+        grown += _escaped(subject, skull, corners, parts, paths, random)
     else:
         paths = styles.short(skull, roots, random)
     grown.append(_of(subject, corners, parts, paths, skull.inside_hairline(roots), random))
@@ -80,6 +85,46 @@ def with_hair(subject: Subject, loose: bool = False) -> Subject:
         corner_uv=subject.corner_uv[bare],
         strands=joined(grown),
     )
+
+
+def _escaped(
+    subject: Subject,
+    skull: Skull,
+    corners: np.ndarray,
+    parts: np.ndarray,
+    combed: styles.Paths,
+    random: np.random.Generator,
+) -> list[Strands]:
+    """What tied hair of roots (N, 3), (N, 3) does not hold: baby hairs, wisps and flyaways."""
+    roots = np.einsum("nk,nkc->nc", parts, subject.vertices[corners])
+    ways = styles.unit(combed.points[:, 2] - combed.points[:, 0])
+    skin, at, places = _scalp(subject, skull, 20 * BABY_HAIRS, random)
+    dense = wisps.near_edge(skull.inside_hairline(places) + 0.005 * _ripple(places))
+    kept = np.flatnonzero(random.random(len(places)) < dense)[:BABY_HAIRS]
+    like = KDTree(roots).query(places[kept])[1]
+    groups = [(skin[kept], at[kept], wisps.baby(skull, places[kept], ways[like], random))]
+    x, _, z = (places / skull.scale).T
+    turn, inside = np.arctan2(x, z + 0.005), skull.inside_hairline(places)
+    for index, (side, azimuth, depth, _) in enumerate(wisps.FRAMING):
+        away = np.hypot((turn - side * azimuth) * 0.07, inside - depth)
+        kept = np.argsort(away)[:WISP]
+        paths = wisps.framing(skull, places[kept], np.full(WISP, index), random)
+        groups.append((skin[kept], at[kept], paths))
+    high = np.flatnonzero((combed.depth[:, -4] < 0.3) & (roots[:, 1] > 0.03 * skull.scale))
+    kept = random.choice(high, FLYAWAYS)
+    groups.append((corners[kept], parts[kept], wisps.flyaways(skull, combed.points[kept], random)))
+    return [_of(subject, c, p, w, np.full(len(c), 1.0), random) for c, p, w in groups]
+
+
+def _scalp(
+    subject: Subject, skull: Skull, count: int, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles (N, 3), weights (N, 3) and places (N, 3), evenly over the scalp and its edge."""
+    skin = subject.faces[subject.materials == Material.SKIN]
+    skin = skin[skull.inside_hairline(subject.vertices[skin].mean(axis=1)) > -0.015]
+    at = subject.vertices[skin].astype(float)  # (F, 3, 3)
+    chosen, parts = scattered(areas(at), count, random)
+    return skin[chosen], parts, np.einsum("nk,nkc->nc", parts, at[chosen])
 
 
 def _skin_and_cloth(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +143,9 @@ def _of(
     random: np.random.Generator,
 ) -> Strands:
     """Binds hair whose roots lie `inside` (N,) metres from the hairline, where it is finer."""
-    tone = np.exp(random.normal(0, 0.22, len(corners)))
+    tone = paths.tone
+    if tone is None:
+        tone = np.exp(random.normal(0, 0.22, len(corners)))
     fine = 0.35 + 0.65 * styles.smooth(-0.004, EDGE, inside)
     return bound(
         subject.vertices,
@@ -113,19 +160,21 @@ def _of(
 
 
 def _roots(
-    subject: Subject, skull: Skull, count: int, random: np.random.Generator
+    subject: Subject, skull: Skull, count: int, gap: bool, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (N, 3) and places on them (N, 3): evenly over the scalp, thinner at its edge."""
-    skin = subject.faces[subject.materials == Material.SKIN]
-    middle = subject.vertices[skin].mean(axis=1)
-    skin = skin[skull.inside_hairline(middle) > -0.015]
-    at = subject.vertices[skin].astype(float)  # (F, 3, 3)
-    chosen, parts = scattered(areas(at), 2 * count, random)
-    places = np.einsum("nk,nkc->nc", parts, at[chosen])
+    """Triangles (N, 3) and places on them (N, 3): evenly over the scalp, thinner at its edge.
+
+    With a `gap`, the scalp shows in the parting.
+    """
+    corners, parts, places = _scalp(subject, skull, 3 * count if gap else 2 * count, random)
     depth = skull.inside_hairline(places) + 0.004 * _ripple(places)
-    dense = np.clip(0.35 + depth / EDGE, 0, 1) ** 1.5  # (2 count,)
-    kept = np.flatnonzero(random.random(2 * count) < dense)[:count]
-    return skin[chosen[kept]], parts[kept]
+    dense = np.clip(0.35 + depth / EDGE, 0, 1) ** 1.5  # (N,)
+    if gap:  # roots along the parting are seen, so they must be as dense as real ones
+        aside, opened = tied.parting(skull, places)
+        beside = opened * np.exp(-np.abs(aside) / 0.009)
+        dense *= (0.5 + 0.5 * beside) * (1 - opened * (np.abs(aside) < GAP))
+    kept = np.flatnonzero(random.random(len(places)) < dense)[:count]
+    return corners[kept], parts[kept]
 
 
 def _ripple(places: np.ndarray) -> np.ndarray:
@@ -150,5 +199,7 @@ def _tail_line(subject: Subject, skull: Skull) -> tuple[np.ndarray, np.ndarray]:
         width = np.interp(np.linspace(0, 1, len(line)), [0, 0.35, 1], [0.012, 0.021, 0.007])
     tie = skull.on(styles.unit(line[:1] - skull.centre), np.array([0.010]))  # (1, 3)
     line, width = np.concatenate([tie, line]), np.concatenate([[0.010], width])
-    width[1] = max(width[1], 0.012)
+    for _ in range(2):  # hair bends in an arc where a mesh has a corner
+        line[1:-1] = 0.5 * line[1:-1] + 0.25 * (line[:-2] + line[2:])
+    width[1] = max(width[1], 0.014)
     return line, width

@@ -1,4 +1,4 @@
-"""Paths of strands on a head: tied back into a tail, or short and falling away from the crown."""
+"""Paths of strands on a head: long and loose, or short and falling away from the crown."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ from scipy.spatial import KDTree
 
 from ico3d.studio.person.growing.skull import Skull
 
-POINTS, SHORT_POINTS = 18, 8
-"""Points of a strand of long and of short hair."""
+SHORT_POINTS = 8
+"""Points of a strand of short hair."""
 LOOSE_POINTS, LOOSE_LENGTH = 26, 0.27
 """Points of a strand of loose hair, and how far it hangs below the head, metres."""
 OFF = 0.006
@@ -24,11 +24,13 @@ class Paths:
         points: (N, K, 3) metres.
         depth: (N, K) 0 at the surface of the hair, 1 at the skin.
         taper: (N, K) factor of the thickness.
+        tone: (N,) factor of the colour; None for strands that differ at random.
     """
 
     points: np.ndarray
     depth: np.ndarray
     taper: np.ndarray
+    tone: np.ndarray | None = None
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -65,70 +67,6 @@ def waves(count: int, length: int, turns: float, random: np.random.Generator) ->
     speed = turns * random.uniform(0.6, 1.4, (count, 1, 3))
     swing = np.sin(2 * np.pi * speed * t + phase) + 0.5 * np.sin(4.4 * np.pi * speed * t - phase)
     return (swing - swing[:, :1]) * np.minimum(1, 3 * t)
-
-
-def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Generator) -> Paths:
-    """Hair combed from roots (N, 3) over the head to where it is tied, parted in the middle."""
-    count, s = len(roots), skull.scale
-    start, end = unit(roots - skull.centre), unit(tie - skull.centre)
-    t = np.linspace(0, 1, POINTS)
-    angle = np.arccos(np.clip(start @ end, -1, 1))[:, None]  # (N, 1)
-    one, two = np.sin((1 - t) * angle), np.sin(t * angle)  # (N, K)
-    path = unit(one[..., None] * start[:, None] + two[..., None] * end)
-    front = smooth(-0.2, 0.7, start[:, 2]) * smooth(0.0, 0.6, start[:, 1])  # (N,)
-    side = np.sign(start[:, 0] + 1e-9)
-    sweep = np.stack([0.55 * side, -0.20 * np.ones(count), 0.12 * np.ones(count)], 1)
-    bow = np.sin(np.pi * t) * (1 - 0.35 * t)
-    path = unit(path + (front[:, None] * bow)[..., None] * sweep[:, None])
-    level = random.random(count) ** 0.45  # 1: on the surface
-    full = 0.0035 + 0.005 * smooth(0.2, 0.9, path[..., 1]) * np.sin(np.pi * t) ** 0.5
-    full = full + 0.004 * smooth(0.2, 0.8, t)[None]
-    rise = 1 - np.exp(-7 * t)
-    height = s * (0.0006 + rise * full * (0.15 + 0.85 * level[:, None]))
-    points = skull.on(path, height)
-    points = clumped(points, 0.15, 420, 0.55)
-    points += 0.0004 * waves(count, POINTS, 0.5, random)
-    disc = 0.009 * _disc(count, random)  # (N, 3)
-    into = smooth(0.72, 1.0, t)[None, :, None]
-    points = points * (1 - into) + into * (tie + disc)[:, None]
-    depth = (1 - level)[:, None] * rise * np.ones((1, POINTS))
-    taper = np.broadcast_to(0.55 + 0.45 * rise, depth.shape)
-    return Paths(points, depth, taper)
-
-
-def _disc(count: int, random: np.random.Generator) -> np.ndarray:
-    """(count, 3) random points of a unit disc that faces backwards."""
-    radius, turn = np.sqrt(random.random(count)), random.uniform(0, 2 * np.pi, count)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], 1)
-
-
-def tail(line: np.ndarray, width: np.ndarray, count: int, random: np.random.Generator) -> Paths:
-    """A bundle of strands along a line.
-
-    Args:
-        line: (L, 3) middle of the bundle from the tie to the tips, metres.
-        width: (L,) its radius, metres.
-        count: Number of strands.
-        random: Source of all random choices.
-    """
-    points_each = 18
-    along = np.linspace(0, 1, len(line))
-    reach = 1 - 0.30 * random.random(count) ** 2.0  # (N,)
-    t = np.linspace(0, 1, points_each) * reach[:, None]  # (N, K)
-    middle = np.stack([np.interp(t, along, c) for c in line.T], -1)  # (N, K, 3)
-    radius = np.sqrt(random.random(count))
-    turn = random.uniform(0, 2 * np.pi, count)
-    side = np.array([1.0, 0.0, 0.0])
-    back = unit(np.cross(np.gradient(line, axis=0), side))  # (L, 3)
-    back = np.stack([np.interp(t, along, c) for c in back.T], -1)  # (N, K, 3)
-    wide = np.interp(t, along, width) * radius[:, None]  # (N, K)
-    points = middle + (wide * np.cos(turn)[:, None])[..., None] * side
-    points += (wide * np.sin(turn)[:, None])[..., None] * back
-    points = clumped(points, 0.2, 160, 0.7)
-    points += 0.0026 * waves(count, points_each, 1.2, random)
-    depth = np.broadcast_to(((1 - radius) ** 0.8)[:, None], t.shape)
-    taper = np.broadcast_to(1 - 0.75 * np.linspace(0, 1, points_each) ** 3, t.shape)
-    return Paths(points, depth, taper)
 
 
 def loose(
