@@ -140,7 +140,7 @@ def seen(shadow, x, y, z, nx, ny, nz):
 
 @subroutine()
 def _mean_gap(shadow, u, v, here, du, dv, wide):
-    """Distance in metres, weighted by itself, to what hides the lamp around a texel; 0 if nothing does."""
+    """Weighted distance in metres to what hides the lamp around a texel; 0 if nothing does."""
     depth, disc = shadow.depth, shadow.disc
     side = depth.shape[0]
     gap, weight = 0.0, 0.0

@@ -58,7 +58,7 @@ def brows(subject: Subject, random: np.random.Generator) -> Strands | None:
 
 
 def lashes(subject: Subject, random: np.random.Generator) -> Strands:
-    """Lashes of both eyes: dense and bent upwards on the upper lid, short and pale on the lower one.
+    """Lashes of both eyes: dense and bent upwards on the upper lid, short and pale below.
 
     Tips stand together in small groups.
     """
