@@ -32,6 +32,19 @@ def test_a_penumbra_is_as_wide_as_lamp_and_distance_make_it(roof):
     np.testing.assert_allclose(share[[0, -1]], [0, 1], atol=1e-6)
 
 
+def test_the_shadow_of_a_small_thing_close_by_ends_softly():
+    side = 0.008
+    corners = side * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    covered = Covered(512, 0.4, np.zeros(3), False)
+    solid = np.arange(2, dtype=np.int32)
+    small = cast(corners, faces, solid, DOWN, 0.3, covered, np.zeros(3))
+    at = np.linspace(-0.02, 0.02, 161)
+    share = np.array([seen(small, x, -0.02, 0.001, 0.0, 1.0, 0.0) for x in at])
+    assert share.min() < 0.1 and share.max() == 1.0
+    assert np.abs(np.diff(share)).max() < 0.1
+
+
 def test_a_lit_surface_throws_no_shadow_on_itself(roof):
     for tilt in (0.0, 0.8, -0.8):
         n = np.array([np.sin(tilt), np.cos(tilt), 0.0])

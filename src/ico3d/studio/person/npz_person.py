@@ -66,10 +66,10 @@ LOOKS = {
 """Rotations of the left eyeball in degrees about X and Y; the files' shapes move the lids only."""
 
 FAIR = Look(
-    skin=(0.51, 0.305, 0.215),
-    lips=(0.40, 0.150, 0.130),
+    skin=(0.53, 0.312, 0.224),
+    lips=(0.43, 0.170, 0.150),
     hair=(0.100, 0.054, 0.029),
-    iris=(0.13, 0.21, 0.19),
+    iris=(0.12, 0.17, 0.15),
     cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
     stripes=False,
     freckles=0.55,

@@ -173,7 +173,7 @@ def shaded_eye(colors, e, p, v, smooth, lights, occlusion, pixel):
     sharp = 0.02 + 0.10 * (1.0 - cornea)
     mr, mg, mb = mirrored(lights, turned, sharp)
     open_ = shadow * (0.35 + 0.65 * occlusion)
-    wet = 0.10 * math.exp(-(((below - 0.0003) / 0.00035) ** 2))
+    wet = 0.14 * math.exp(-(((below - 0.0003) / 0.00035) ** 2))
     gloss = math.sqrt(open_) * min(0.35, mirror) + wet * (0.4 + 0.6 * occlusion)
     return r + gloss * mr, g + gloss * mg, b + gloss * mb
 
@@ -188,9 +188,9 @@ def _white(e, x, y, z, across, pixel):
     vein = (1.0 - smoothstep(0.0, 0.16, fibre - 0.3)) * far
     near = math.sqrt((x - e[20]) ** 2 + (y - e[21]) ** 2)
     pink = math.exp(-((near / 0.0034) ** 2))
-    r = 0.70 - 0.05 * far
-    g = 0.655 - 0.11 * far - 0.10 * vein
-    b = 0.62 - 0.13 * far - 0.10 * vein
+    r = 0.62 - 0.05 * far
+    g = 0.57 - 0.10 * far - 0.10 * vein
+    b = 0.53 - 0.11 * far - 0.10 * vein
     return (
         r + pink * (0.62 - r),
         g + pink * (0.30 - g),
@@ -221,9 +221,9 @@ def _behind(colors, e, place, normal, ray, rim, lights, pixel):
     fibre = 1.0 + detail * (0.9 * (fine - 0.5) + 0.7 * (thick - 0.5))
     ruff = math.exp(-(((t - 0.50 - 0.05 * (thick - 0.5)) / 0.09) ** 2))
     glow = 0.68 * fibre * (0.75 + 0.35 * ruff + 0.45 * smoothstep(0.45, 0.8, t))
-    ring = smoothstep(0.80, 0.99, t)
+    ring = smoothstep(0.70, 0.96, t)
     warm = 1.0 - smoothstep(0.40, 0.66, t)
-    dark = (1.0 - 0.82 * ring) * smoothstep(PUPIL - soft, PUPIL + soft, t)
+    dark = (1.0 - 0.88 * ring) * smoothstep(PUPIL - soft, PUPIL + soft, t)
     r = colors.iris[0] * glow * dark * (1.0 + 0.8 * warm)
     g = colors.iris[1] * glow * dark * (1.0 + 0.15 * warm)
     b = colors.iris[2] * glow * dark * (1.0 - 0.35 * warm)

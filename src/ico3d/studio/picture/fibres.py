@@ -14,7 +14,7 @@ from ico3d.studio.raster import to_screen
 MIDDLE = np.array([0.0, 0.02, 0.0], np.float32)
 """Point in canonical head space, metres, from which hair faces outwards."""
 
-SHARE = {Material.BROW: 0.8, Material.LASH: 0.25}
+SHARE = {Material.BROW: 1.35, Material.LASH: 0.30}
 """Albedo of brows and lashes relative to that of the hair."""
 WELL_BEHIND = 0.02
 """Metres behind a surface at which segments of strands are left out, if both ends lie there."""
@@ -212,7 +212,10 @@ def _seen(nearest, x, y, factor, nearness):
 
 
 def strand_colors(strands: Strands, hair: np.ndarray) -> np.ndarray:
-    """(N, 3) float32 albedo of strands: brows are a little darker than hair (3,), lashes much."""
+    """(N, 3) float32 albedo of strands: those of brows are paler than hair (3,), lashes darker.
+
+    Brows have fewer hairs that shade each other, so that they look like the hair in the end.
+    """
     share = np.ones(len(strands.material))
     for material, value in SHARE.items():
         share[strands.material == material] = value

@@ -31,8 +31,8 @@ class Paint:
     """Values per vertex that textures and shading need.
 
     Attributes:
-        channels: (V, 6) float32: lip, redness, freckles, beard, scalp, each 0 to 1, and the depth
-            behind the lips in metres.
+        channels: (V, 6) float32: lip, redness, freckles, beard, scalp, each 0 to 1 (redness is
+            below 0 where skin is sallow), and the depth behind the lips in metres.
         strands: (V, 4) float32, as `strand_frames` returns them.
         openings: (O,) float32 gap of the inner lips in metres for each of `OPENINGS`, ascending.
         occlusion: (O, V) float32 visible share of the sky for each of `OPENINGS`.
@@ -87,6 +87,10 @@ def _channels(subject: Subject) -> np.ndarray:
         *((e, 0.7, 0.13) for e in ears),
         *((marks[i], 0.25, 0.08) for i in (39, 42, 36, 45)),
         (marks[8], 0.3, 0.12),
+        # Below zero: yellowish on the forehead, cool and thin around the eyes.
+        ((marks[19] + marks[24]) / 2 + np.array([0, 0.17 * width, 0]), -0.45, 0.26),
+        *((eye - np.array([0, 0.08 * width, -0.08 * width]), -0.55, 0.11) for eye in eyes),
+        *((eye + np.array([0, 0.05 * width, 0.08 * width]), -0.30, 0.12) for eye in eyes),
     ]:
         redness += strength * bump(vertices, point, radius * width)
     freckles = bump(vertices, marks[28], 0.2 * width)
@@ -95,7 +99,7 @@ def _channels(subject: Subject) -> np.ndarray:
     return np.stack(
         [
             subject.lip_mask,
-            np.clip(redness, 0, 1),
+            np.clip(redness, -1, 1),
             np.clip(freckles, 0, 1),
             beard_share(vertices, marks) * (1 - subject.lip_mask),
             _scalp(subject),

@@ -18,9 +18,11 @@ BIAS = 0.003
 """Metres behind the depth map that still count as lit: fewer speckles, more leaking light."""
 STEEPEST = 2.5
 """Largest slope of a surface in the depth map that the comparison follows."""
-FARTHEST = 0.30
+FARTHEST = 0.12
 """Metres to what hides a lamp beyond which shadows grow no softer."""
-SEARCH, FILTER = 10, 22
+SHARPEST = 2.2
+"""Radius in texels below which no penumbra shrinks: it hides the steps of the depth map."""
+SEARCH, FILTER = 18, 22
 """Samples of the depth map: for what hides the lamp, and for the share that it hides."""
 
 
@@ -128,7 +130,7 @@ def seen(shadow, x, y, z, nx, ny, nz):
     gap = _mean_gap(shadow, u, v, here, du, dv, wide)
     if gap <= 0.0:
         return 1.0
-    radius = max(1.2, shadow.size * min(gap, FARTHEST) * scale)
+    radius = max(SHARPEST, shadow.size * min(gap, FARTHEST) * scale)
     total = 0.0
     for k in range(shadow.disc.shape[0]):
         a, b = radius * shadow.disc[k, 0], radius * shadow.disc[k, 1]
@@ -138,24 +140,27 @@ def seen(shadow, x, y, z, nx, ny, nz):
 
 @subroutine()
 def _mean_gap(shadow, u, v, here, du, dv, wide):
-    """Mean distance in metres to what hides the lamp around a texel; 0 if nothing does."""
+    """Weighted distance in metres to what hides the lamp around a texel; 0 if nothing does."""
     depth, disc = shadow.depth, shadow.disc
     side = depth.shape[0]
-    gap, count = 0.0, 0
+    gap, weight = 0.0, 0.0
     stride = disc.shape[0] / SEARCH
     for k in range(SEARCH + 1):
         a, b = 0.0, 0.0
         if k > 0:
             index = int((k - 0.5) * stride)
-            a, b = wide * disc[index, 0], wide * disc[index, 1]
+            # Denser near the middle, where also things that are close hide the lamp.
+            away = wide * math.sqrt(disc[index, 0] ** 2 + disc[index, 1] ** 2)
+            a, b = away * disc[index, 0], away * disc[index, 1]
         i, j = int(u + a + 0.5), int(v + b + 0.5)
         if i < 0 or j < 0 or i >= side or j >= side:
             continue
         nearer = depth[j, i] - (here + a * du + b * dv)
         if nearer > 0.0:
-            gap += nearer
-            count += 1
-    return gap / count if count > 0 else 0.0
+            # What is far off the surface makes the penumbra, not the surface's own unevenness.
+            gap += nearer * nearer
+            weight += nearer
+    return gap / weight if weight > 0.0 else 0.0
 
 
 @subroutine()

@@ -7,9 +7,9 @@ from ico3d.splat.cpu.compile import subroutine
 from ico3d.studio.picture.lighting import ambient, diffuse, highlight, seen_lamp, unoccluded
 from ico3d.studio.picture.textures import grain, noise, slope, smoothstep, spots, visible
 
-SPREAD = (0.30, 0.19, 0.14)
+SPREAD = (0.35, 0.22, 0.16)
 """How far red, green and blue light spread past the terminator, as cosines: red goes deepest."""
-BLEED = (0.90, 1.02, 1.05)
+BLEED = (0.84, 1.02, 1.06)
 """Exponents that widen half shadows for red light and narrow them for green and blue light."""
 CALM = (0.75, 0.35, 0.15)
 """Share of relief that red, green and blue light do not see, because they spread below it."""
@@ -48,10 +48,11 @@ def skin_at(colors, channels, x, y, z, pixel):
     # Melanin darkens all, blue most; blood takes green and blue.
     melanin = 1.0 + 0.05 * large + 0.05 * small + 0.05 * fine
     patch = grain(x + 5.0, y, z, 0.013, pixel) + 0.6 * grain(x + 9.0, y, z, 0.004, pixel)
-    blood = 0.19 * red * (1.0 + 0.35 * patch) + 0.05 * (patch + 0.4)
-    r = colors.skin[0] * melanin * (1.0 - 0.05 * blood)
-    g = colors.skin[1] * melanin**1.25 * (1.0 - 0.44 * blood)
-    b = colors.skin[2] * melanin**1.5 * (1.0 - 0.42 * blood)
+    blood = 0.36 * max(0.0, red) * (1.0 + 0.35 * patch) + 0.05 * (patch + 0.4)
+    sallow = max(0.0, -red)
+    r = colors.skin[0] * melanin * (1.0 - 0.05 * blood) * (1.0 - 0.13 * sallow)
+    g = colors.skin[1] * melanin**1.25 * (1.0 - 0.44 * blood) * (1.0 - 0.08 * sallow)
+    b = colors.skin[2] * melanin**1.5 * (1.0 - 0.42 * blood) * (1.0 - 0.12 * sallow)
     dots = spots(x, y, z, 0.0036, pixel) + 0.8 * spots(x + 1.0, y, z, 0.0023, pixel)
     dots += 0.7 * spots(x + 4.0, y, z, 0.0060, pixel)
     dots = min(1.0, dots) * colors.freckles * (0.08 + freckle)
@@ -68,7 +69,7 @@ def skin_at(colors, channels, x, y, z, pixel):
         b += (0.7 * colors.hair[2] - b) * roots
     edge = 0.0
     if lip > 0.0:
-        edge = smoothstep(0.10, 0.85, lip + 0.10 * small)
+        edge = 0.92 * smoothstep(0.0, 1.0, lip + 0.10 * small)
         tint = 1.0 + 0.10 * grain(x * 3.0, y * 0.6, z, 0.0024, pixel) + 0.07 * small
         r += (colors.lips[0] * tint - r) * edge
         g += (colors.lips[1] * tint - g) * edge
@@ -79,7 +80,7 @@ def skin_at(colors, channels, x, y, z, pixel):
         g,
         b,
         0.54 + 0.04 * small - 0.10 * edge,
-        oil + (0.45 - oil) * edge,
+        oil + (0.55 - oil) * edge,
         (0.9 + 0.35 * edge + 0.10 * fine) * (1.0 - 0.9 * roots),
     )
 

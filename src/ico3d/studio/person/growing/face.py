@@ -9,10 +9,14 @@ from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import Strands, bound
 from ico3d.studio.person.subject import Material, Subject
 
-BROW_HAIRS, LASH_HAIRS = 430, 130
+BROW_HAIRS, LASH_HAIRS = 800, 210
 """Hairs of one brow, and lashes of one lid."""
-BROW_RADIUS, LASH_RADIUS = 0.00010, 0.00009
+BROW_RADIUS, LASH_RADIUS = 0.000065, 0.000065
 """Half of the thickness of hairs, metres."""
+LOWERED = 0.0064, 0.0046, 0.0037
+"""Metres by which brows grow below their cards: near the nose, in the middle, outside."""
+FULLER = 0.40
+"""Height that brows have beyond that of their cards, as a share of it."""
 POINTS = 5
 UPPER_LIDS = ((39, 38, 37, 36), (42, 43, 44, 45))
 """Landmarks along the upper lids, from the nose outwards."""
@@ -31,25 +35,33 @@ def brows(subject: Subject, random: np.random.Generator) -> Strands | None:
     edges = smooth(0.02, 0.34, v) * (1 - smooth(0.52, 0.92, v))
     kept = np.flatnonzero(random.random(len(u)) < ends * edges)[: 2 * BROW_HAIRS]
     places, u, v, along, up = places[kept], u[kept], v[kept], unit(along[kept]), up[kept]
+    lower = np.interp(u, [0, 0.5, 1.0], LOWERED)
+    places = places + FULLER * (v - 0.45)[:, None] * up - lower[:, None] * unit(up)
     up = unit(up - along * (up * along).sum(1, keepdims=True))
     out = np.cross(along, up)
     out *= np.sign(out[:, 2:])
+    corners = _nearest_skin(subject, places)
+    places = _on_planes(subject.vertices[corners].astype(float), places)
     count = len(u)
     angle = np.interp(u, [0, 0.12, 0.3, 0.6, 1.0], [80.0, 58.0, 30.0, 8.0, -14.0])
     angle = np.radians(angle + 34 * (0.45 - v) + random.normal(0, 7, count))
-    length = np.interp(u, [0, 0.2, 0.6, 1.0], [0.0050, 0.0075, 0.0075, 0.0050])
+    length = np.interp(u, [0, 0.2, 0.6, 1.0], [0.0050, 0.0072, 0.0072, 0.0050])
     length = (length * random.uniform(0.6, 1.1, count))[:, None, None]
     t = np.linspace(0, 1, POINTS)[None, :, None]
     bent = angle[:, None] - 0.35 * t[..., 0]  # (N, K): hairs bend outwards
     lies = np.cos(bent)[..., None] * along[:, None] + np.sin(bent)[..., None] * up[:, None]
     points = places[:, None] + length * (t * lies + (0.30 * t - 0.26 * t**2) * out[:, None])
-    points -= 0.0005 * out[:, None]
-    corners = _nearest_skin(subject, places)
-    return _grown(subject, corners, points, BROW_RADIUS, Material.BROW, random)
+    points -= 0.0002 * out[:, None]
+    tone = np.exp(random.normal(0, 0.25, count))
+    radius = np.full(count, BROW_RADIUS)
+    return _grown(subject, corners, points, radius, Material.BROW, tone)
 
 
 def lashes(subject: Subject, random: np.random.Generator) -> Strands:
-    """Lashes of both eyes: longer on the upper lid, bent upwards, tips together in small groups."""
+    """Lashes of both eyes: dense and bent upwards on the upper lid, short and pale below.
+
+    Tips stand together in small groups.
+    """
     sampled = _on_cards(subject, Material.LASH, 40 * LASH_HAIRS, random)
     if sampled is None:
         corners, roots, ways, lower = _along_lids(subject, random)
@@ -61,7 +73,7 @@ def lashes(subject: Subject, random: np.random.Generator) -> Strands:
         roots = places[kept] - uv[kept, 1:] * ways
         lower = uv[kept, 0] > LOWER
     count = len(roots)
-    length = np.where(lower, 0.0042, 0.0088) * random.uniform(0.55, 1.1, count)
+    length = np.where(lower, 0.0026, 0.0082) * random.uniform(0.55, 1.1, count)
     curl = np.where(lower, -0.35, 0.85)[:, None, None] * np.array([0.0, 1.0, 0.15])
     ways = unit(unit(ways) + random.normal(0, 0.10, (count, 3)))
     t = np.linspace(0, 1, POINTS)[None, :, None]
@@ -69,18 +81,20 @@ def lashes(subject: Subject, random: np.random.Generator) -> Strands:
     guides = random.permutation(count)[: max(1, count // 5)]
     nearest = guides[KDTree(points[guides, 0]).query(points[:, 0])[1]]
     points += 0.45 * t**2 * (points[nearest, -1:] - points[:, -1:])
-    return _grown(subject, corners, points, LASH_RADIUS, Material.LASH, random)
+    tone = np.where(lower, 2.6, 1.0) * np.exp(random.normal(0, 0.25, count))
+    radius = np.where(lower, 0.55, 1.0) * LASH_RADIUS
+    return _grown(subject, corners, points, radius, Material.LASH, tone)
 
 
 def _grown(
     subject: Subject,
     corners: np.ndarray,
     points: np.ndarray,
-    radius: float,
+    radius: np.ndarray,
     material: Material,
-    random: np.random.Generator,
+    tone: np.ndarray,
 ) -> Strands:
-    taper = radius * (1 - 0.8 * np.linspace(0, 1, POINTS) ** 1.5)
+    taper = radius[:, None] * (1 - 0.8 * np.linspace(0, 1, POINTS) ** 1.5)
     return bound(
         subject.vertices,
         corners,
@@ -88,7 +102,7 @@ def _grown(
         points,
         np.linspace(0.75, 1.0, POINTS),
         taper,
-        np.exp(random.normal(0, 0.25, len(corners))),
+        tone,
         int(material),
     )
 
@@ -142,3 +156,10 @@ def _nearest_skin(subject: Subject, places: np.ndarray) -> np.ndarray:
     """(N, 3) vertices of the triangle of skin next to each place (N, 3)."""
     skin = subject.faces[subject.materials == Material.SKIN]
     return skin[KDTree(subject.vertices[skin].mean(axis=1)).query(places)[1]]
+
+
+def _on_planes(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(N, 3) where places (N, 3) meet the planes of triangles (N, 3, 3) next to them."""
+    normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    away = ((places - corners.mean(axis=1)) * normals).sum(axis=1, keepdims=True)
+    return places - away * normals
