@@ -1,17 +1,19 @@
 """Plain clothes: where they end, where they fold, how relief tilts a surface."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from ico3d.studio.dress.tailoring import HEM_RIB, RIB, tailored
+from ico3d.studio.dress.tailoring import FOLD, HEM_RIB, RIB, _even, tailored
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.edges import open_loops, without_covered_neck
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture.clothes.clothed import STEEPEST, tilted
-from ico3d.studio.picture.clothes.relief import Weave, cable, folds, stitch
+from ico3d.studio.picture.clothes.knitwear import jumper
+from ico3d.studio.picture.clothes.relief import ROW, STITCH, Weave, folds, knit_height, stitch
 from support.recordings import synthetic_bodies
 
 RINGS, SIDES, RADIUS = 30, 16, 0.05
@@ -102,9 +104,31 @@ def test_folds_are_as_deep_as_asked_and_none_where_none_are():
 
 def test_knitwear_repeats():
     for u, v in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 2)):
-        assert stitch(u + 0.0058, v) == pytest.approx(stitch(u, v), abs=1e-9)
-        assert cable(u, v + 0.08) == pytest.approx(cable(u, v), abs=1e-6)
-    assert cable(0.2, 0.0) == 0.0  # only three cables run side by side
+        assert stitch(u + STITCH, v) == pytest.approx(stitch(u, v), abs=1e-9)
+        assert stitch(u, v + ROW) == pytest.approx(stitch(u, v), abs=1e-5)
+
+
+@pytest.mark.parametrize("pixel", [0.0008, 0.002])
+def test_a_plain_jumper_has_one_colour_and_no_cables(pixel):
+    wool = SimpleNamespace(jumper=(0.05, 0.13, 0.15))
+    middle = Weave(0.0, 0.0, 0.0, 0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 9.0, 0.0)
+    colours, heights = [], []
+    for u, v, z in np.random.default_rng(2).uniform(-0.12, 0.12, (400, 3)).tolist():
+        w = middle._replace(u=u, v=v)
+        heights.append(knit_height(w, pixel))
+        colours.append(jumper(wool, w, heights[-1], u, v, z, pixel)[:3])
+    tones = np.array(colours) / wool.jumper
+    np.testing.assert_allclose(tones, tones[:, :1] * np.ones(3), rtol=1e-9)
+    assert np.ptp(tones) < 0.12 and np.ptp(heights) < 0.0003
+
+
+def test_folds_fade_where_their_pattern_is_squeezed():
+    places = np.zeros((30, 3))
+    at = 0.01 * np.arange(30)
+    places[:, 1] = (at + 0.08 * (at > 0.145)) / FOLD
+    edges = np.stack([np.arange(29), np.arange(1, 30)], 1)
+    even = _even(places, edges, np.diff(at))
+    assert (even[14:16] == 0).all() and (even[:10] == 1).all() and (even[20:] == 1).all()
 
 
 def test_skin_far_below_a_collar_is_left_out(sleeve):

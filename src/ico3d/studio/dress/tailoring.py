@@ -14,14 +14,16 @@ COLLAR_RIB, HEM_RIB, LEG_HEM = 0.026, 0.055, 0.022
 """Widths of the ribbed collar, of ribbed cuffs and hem, and of a trouser leg's hem, metres."""
 RIB = 0.0075
 """Width of a rib, metres."""
-FOLD, FOLD_ACROSS = 0.046, 0.11
+FOLD, FOLD_ACROSS = 0.058, 0.13
 """Distance of folds along a limb, and their length across it, metres."""
-LOOSE = 0.0016
+LOOSE = 0.0009
 """Depth in metres of folds where nothing pushes cloth together."""
-DEEPEST = 0.011
+DEEPEST = 0.009
 """Depth of the deepest folds, metres."""
 PUSHED = 0.035
 """Depth in metres of folds where a limb's cloth has lost its whole length."""
+EVEN = 1.9
+"""Squeeze of the pattern of folds, as a multiple of what is meant, from which cloth has none."""
 ARM = ("clavicle", "shoulder", "upperarm", "lowerarm", "wrist")
 FAR = 9.0
 SLANT = 0.55
@@ -68,7 +70,8 @@ class Tailored:
         for _ in range(3):  # a fold is longer than a thread
             around = np.bincount(a, pushed[b], count) + np.bincount(b, pushed[a], count)
             pushed = 0.4 * pushed + 0.6 * around / degree
-        depth = self.loose * (1 + 3 * pushed) + PUSHED * pushed * (self.loose > 0)
+        free = np.minimum(self.loose / (0.5 * LOOSE), 1)  # (V,)
+        depth = self.loose * (1 + 3 * pushed) + PUSHED * pushed * free
         return np.minimum(depth, DEEPEST).astype(np.float32)
 
 
@@ -91,7 +94,7 @@ def tailored(subject: Subject) -> Tailored:
     return Tailored(
         uv,
         fields.astype(np.float32),
-        _loose(subject, fields).astype(np.float32),
+        (_loose(subject, fields) * _even(places, edges, lengths)).astype(np.float32),
         edges,
         lengths,
         along,
@@ -124,6 +127,24 @@ def _fold_places(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     along -= SLANT * axis[:, 1] ** 2 * np.hypot(vertices[:, 0], 0.04) * knit
     places = np.stack([vertices[:, 0], along, vertices[:, 2]], 1)
     return places / [FOLD_ACROSS, FOLD, FOLD_ACROSS], axis
+
+
+def _even(places: np.ndarray, edges: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """(V,) 1 where the pattern of folds is as long as meant, 0 where it is squeezed.
+
+    Between trunk and arm the pattern turns within centimetres; folds there would be sharp creases.
+    """
+    (a, b), count = edges.T, len(places)
+    rate = np.abs(places[a, 1] - places[b, 1]) * FOLD / lengths  # (E,)
+    most = np.zeros(count)
+    np.maximum.at(most, a, rate)
+    np.maximum.at(most, b, rate)
+    even = np.clip((EVEN - most) / (0.4 * EVEN), 0, 1)  # (V,)
+    degree = np.maximum(np.bincount(a, minlength=count) + np.bincount(b, minlength=count), 1)
+    for _ in range(3):
+        around = np.bincount(a, even[b], count) + np.bincount(b, even[a], count)
+        even = np.minimum(even, around / degree)
+    return even
 
 
 def _finished_edges(subject: Subject, material: Material) -> list[np.ndarray]:

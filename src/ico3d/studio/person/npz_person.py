@@ -73,7 +73,7 @@ FAIR = Look(
     cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
     stripes=False,
     freckles=0.55,
-    jumper=(0.095, 0.165, 0.168),
+    jumper=(0.060, 0.120, 0.140),
     stubble=0.0,
 )
 TANNED = Look(

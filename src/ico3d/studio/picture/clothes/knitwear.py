@@ -3,49 +3,47 @@
 import math
 
 from ico3d.splat.cpu.compile import subroutine
-from ico3d.studio.picture.clothes.relief import ROW, TWILL, stitch, twill, yarn
+from ico3d.studio.picture.clothes.relief import RIBBED, ROW, TWILL, stitch, twill
 from ico3d.studio.picture.materials import Spot
-from ico3d.studio.picture.textures import grain, noise, smoothstep, spots, visible
+from ico3d.studio.picture.textures import grain, noise, smoothstep, visible
 
 THREAD = (0.42, 0.235, 0.085)
 """Albedo of the stitches on jeans."""
+BETWEEN, MEAN_STITCH = 0.16, 0.41
+"""How much darker wool is between stitches, and the mean height of a stitch, 0 to 1."""
+FUZZ = 0.22
+"""Light that the hairs of wool send back at grazing angles."""
 
 
 @subroutine()
 def jumper(colors, w, height, x, y, z, pixel):
-    """Wool: darker between stitches and cables, of many tones, with fuzz.
+    """Wool of one colour, darker between ribs and stitches, with fuzz.
 
     Args:
         colors: Colours of the person.
         w: The place, a `Weave`.
-        height: Height of ribs, cables and stitches there, metres.
+        height: Height of ribs and stitches there, metres.
         x: Place on the person at rest, metres.
         y: Place on the person at rest, metres.
         z: Place on the person at rest, metres.
         pixel: Size of a pixel on the surface, metres.
     """
-    seen = visible(ROW, 1.6 * pixel)
-    tone = 1.0 + 0.16 * seen * (yarn(w.u, w.v) - 0.5)
-    tone += 0.06 * grain(x, y, z, 0.0013, pixel) + 0.10 * grain(x, 0.5 * y, z, 0.007, pixel)
-    tone += 0.05 * grain(x, y, z, 0.019, pixel)
-    deep = seen * (0.72 + 0.36 * stitch(w.u, w.v)) + (1.0 - seen) * 0.9
-    rib = 1.0 - smoothstep(0.94, 1.06, w.hem)
-    deep += rib * (0.94 - deep)
-    tone *= deep * (0.84 + 0.16 * smoothstep(-0.001, 0.004, height))
+    # Wool is never quite even: broad, faint clouds, too soft to look like a pattern.
+    tone = 1.0 + 0.03 * grain(x, 0.6 * y, z, 0.05, pixel)
+    rib = 1.0 - smoothstep(0.88, 1.12, w.hem)
+    seen = visible(ROW, 2.8 * pixel) * (1.0 - rib)
+    # Stitches keep the mean tone: wool is as bright from far away as from near.
+    tone *= 1.0 - seen * BETWEEN * (MEAN_STITCH - stitch(w.u, w.v))
+    if rib > 0.0:
+        tone *= 1.0 - rib * 0.16 * (1.0 - smoothstep(-0.0005, 0.9 * RIBBED, height))
     base = colors.jumper
-    r, g, b = base[0] * tone, base[1] * tone, base[2] * tone
-    # Tweed: short tufts of undyed and of dark wool are spun into the yarn.
-    pale, dark = spots(x, 0.6 * y, z, 0.009, pixel), spots(x + 2.0, 0.6 * y, z, 0.008, pixel)
-    pale, dark = min(0.20, 1.2 * pale), min(0.35, 1.5 * dark)
-    r, g, b = r + (0.45 - r) * pale, g + (0.40 - g) * pale, b + (0.31 - b) * pale
-    r, g, b = r * (1.0 - dark), g * (1.0 - dark), b * (1.0 - dark)
     # Fine hairs scatter light within wool: it has no hard terminator, and glows at its rim.
-    return Spot(r, g, b, 0.9, 0.012, 0.30, 0.0, 0.16)
+    return Spot(base[0] * tone, base[1] * tone, base[2] * tone, 0.9, 0.010, 0.34, 0.0, FUZZ)
 
 
 @subroutine()
 def jeans(colors, w, x, y, z, pixel):
-    """Indigo denim: worn pale on thighs, knees, seams and hems, sewn with a tan thread."""
+    """Indigo denim: a little paler on thighs, knees, seams and hems, sewn with a tan thread."""
     hip, ankle = colors.legs[0], colors.legs[1]
     down = (hip[1] - y) / (hip[1] - ankle[1])
     out = abs(x) - hip[0] - down * (ankle[0] - hip[0])
@@ -55,15 +53,15 @@ def jeans(colors, w, x, y, z, pixel):
     thigh = math.exp(-(((down - 0.28) / 0.22) ** 2)) + 0.8 * math.exp(
         -(((down - 0.53) / 0.09) ** 2)
     )
-    worn = 0.62 * thigh * front**1.5 + 0.14 * (noise(x / 0.05, y / 0.12, z / 0.05) - 0.5)
-    worn += 0.30 * (1.0 - smoothstep(0.0, 0.012, w.seam)) + 0.22 * (
+    worn = 0.24 * thigh * front**1.5 + 0.05 * (noise(x / 0.05, y / 0.12, z / 0.05) - 0.5)
+    worn += 0.10 * (1.0 - smoothstep(0.0, 0.012, w.seam)) + 0.08 * (
         1.0 - smoothstep(0.0, 0.3, w.hem)
     )
     # Yarn of uneven thickness draws long pale streaks.
     streak = grain(w.u * 4.0, w.v * 0.25, 0.0, 0.011, 0.6 * pixel)
-    worn += 0.13 * streak + 0.10 * grain(x, y, z, 0.004, pixel)
+    worn += 0.05 * streak + 0.03 * grain(x, y, z, 0.004, pixel)
     weave = visible(TWILL, 2.0 * pixel) * math.sin(twill(w.u, w.v))
-    worn = min(1.0, max(0.0, 0.22 + worn + 0.10 * weave))
+    worn = min(1.0, max(0.0, 0.22 + worn + 0.07 * weave))
     dark, pale = colors.jeans[0], colors.jeans[1]
     r = dark[0] + (pale[0] - dark[0]) * worn
     g = dark[1] + (pale[1] - dark[1]) * worn
@@ -74,7 +72,7 @@ def jeans(colors, w, x, y, z, pixel):
     sewn = max(_sewn(w.seam, w.v, pixel), _sewn(side, w.v, pixel))
     sewn = max(sewn, _sewn(abs(w.hem * 0.022 - 0.017) + 0.004, 1.3 * w.u, pixel))
     sewn = max(sewn, _pocket(abs(x) - hip[0], y - hip[1], behind, pixel))
-    shade = 1.0 - 0.5 * side_seam
+    shade = 1.0 - 0.3 * side_seam
     r, g, b = r * shade, g * shade, b * shade
     r, g, b = r + (THREAD[0] - r) * sewn, g + (THREAD[1] - g) * sewn, b + (THREAD[2] - b) * sewn
     return Spot(r, g, b, 0.75, 0.025, 0.18, 0.0, 0.05)
@@ -86,7 +84,7 @@ def _sewn(away, along, pixel):
     line = 1.0 - smoothstep(0.0007, 0.0007 + pixel, abs(away - 0.004))
     gap = smoothstep(0.15, 0.3, abs(along / 0.0034 - math.floor(along / 0.0034) - 0.5))
     near = visible(0.003, pixel)
-    return 0.75 * line * (near * gap + (1.0 - near) * 0.7) * min(1.0, 0.0022 / pixel)
+    return 0.5 * line * (near * gap + (1.0 - near) * 0.7) * min(1.0, 0.0022 / pixel)
 
 
 @subroutine()

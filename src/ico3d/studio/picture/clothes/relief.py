@@ -9,12 +9,12 @@ import math
 from typing import NamedTuple
 
 from ico3d.splat.cpu.compile import kernel, subroutine
-from ico3d.studio.picture.textures import hashed, smoothstep, visible
+from ico3d.studio.picture.textures import smoothstep, visible
 
-STITCH, ROW = 0.0058, 0.0046
-"""Width and height of a stitch of knitwear, metres."""
-CABLE, STRAND, TWIST = 0.082, 0.0095, 0.080
-"""Distance between two cables, half the width of a cable's strand, length of a twist, metres."""
+STITCH, ROW = 0.0036, 0.0028
+"""Width and height of a stitch of fine knitwear, metres."""
+RAISED, RIBBED = 0.00020, 0.0013
+"""Height of a stitch and of a rib, metres."""
 TWILL = 0.0021
 """Distance between two diagonal lines of denim, metres."""
 
@@ -87,39 +87,18 @@ def folds(w):
 
 @subroutine()
 def knit_height(w, pixel):
-    """Height of ribs at the edges of knitwear, of cables and stitches."""
+    """Height of ribs at the edges of knitwear, and of stitches; seams are shallow hollows."""
     height = 0.0
-    rib = 1.0 - smoothstep(0.94, 1.06, w.hem)
+    rib = 1.0 - smoothstep(0.88, 1.12, w.hem)
     if rib > 0.0:
         round_ = 0.5 + 0.5 * math.cos(w.ribs * math.atan2(w.sine, w.cosine))
-        height += rib * 0.0015 * visible(0.0075, 1.8 * pixel) * round_ * (2.0 - round_)
-        height -= 0.0018 * rib * smoothstep(0.85, 1.0, w.hem)
+        height += rib * RIBBED * visible(0.0075, 1.8 * pixel) * round_ * (2.0 - round_)
+        height -= 0.0012 * rib * smoothstep(0.8, 1.0, w.hem)
         height += 0.0020 * (1.0 - smoothstep(0.0, 0.12, w.hem))
-    if rib < 1.0:
-        height += (1.0 - rib) * cable(w.u, w.v)
-        height += (1.0 - rib) * 0.0011 * visible(ROW, 1.6 * pixel) * stitch(w.u, w.v)
-    return height - 0.0012 * (1.0 - smoothstep(0.0, 0.005, w.seam))
-
-
-@kernel()
-def cable(u, v):
-    """Height of the ropes of stitches that run along knitwear, three side by side."""
-    column = math.floor(u / CABLE + 0.5)
-    if abs(column) > 1.0:
-        return 0.0
-    across = u - column * CABLE
-    if abs(across) > 0.030:
-        return 0.0
-    turn = 6.2832 * v / TWIST + 1.5 * column
-    sway, front = 0.0105 * math.sin(turn), math.cos(turn)
-    height = 0.0
-    for side in (-1.0, 1.0):
-        off = (across - side * sway) / STRAND
-        if abs(off) < 1.0:
-            over = 0.5 + 0.5 * side * front
-            height = max(height, math.sqrt(1.0 - off * off) * (0.0026 + 0.0022 * over))
-    beside = 1.0 - smoothstep(0.0, 0.004, abs(abs(across) - 0.025))
-    return height - 0.0011 * beside
+    fine = visible(ROW, 2.8 * pixel)
+    if rib < 1.0 and fine > 0.0:
+        height += (1.0 - rib) * RAISED * fine * stitch(w.u, w.v)
+    return height - 0.0005 * (1.0 - smoothstep(0.0, 0.006, w.seam))
 
 
 @kernel()
@@ -129,12 +108,6 @@ def stitch(u, v):
     leg = 4.0 * (abs(column) - 0.25)
     phase = 6.2832 * (v / ROW - 1.15 * abs(column))
     return max(0.0, 1.0 - leg * leg) * (0.62 + 0.38 * math.cos(phase))
-
-
-@subroutine()
-def yarn(u, v):
-    """A number in [0, 1) for each stitch: no two of a hand-dyed yarn are alike."""
-    return hashed(math.floor(u / STITCH), math.floor(v / ROW), 5)
 
 
 @subroutine()
