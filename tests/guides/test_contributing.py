@@ -24,7 +24,8 @@ def defined(tree, within=""):
             yield within + node.name
         else:
             targets = getattr(node, "targets", [getattr(node, "target", None)])
-            yield from (within + t.id for t in targets if isinstance(t, ast.Name))
+            names = (name for t in targets if t for name in getattr(t, "elts", [t]))
+            yield from (within + name.id for name in names if isinstance(name, ast.Name))
 
 
 def test_there_are_twenty_rows_and_no_other():
