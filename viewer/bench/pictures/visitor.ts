@@ -67,7 +67,7 @@ export class Line {
   /**
    * Leads the page's line through here; before the page is opened.
    *
-   * @param hold the server's message after which nothing more comes, while `held`
+   * @param hold the server's message after which no answer comes, while `held`
    */
   static async through(page: Page, hold?: RegExp): Promise<Line> {
     const line = new Line();
@@ -82,12 +82,12 @@ export class Line {
     let holds = false;
     server.onMessage((message) => {
       if (typeof message === 'string') this.onText(message);
-      if (!holds) socket.send(message);
+      if (!holds || isAcknowledgement(message)) socket.send(message);
       if (this.held && typeof message === 'string' && hold?.test(message)) holds = true;
     });
   }
 
-  /** From now on the server falls silent after the message in question. */
+  /** From now on the server answers nothing after the message in question, but still takes sound. */
   hold(): void {
     this.held = true;
   }
@@ -97,4 +97,9 @@ export class Line {
     this.down = true;
     for (const socket of this.sockets.splice(0)) await socket.close({ code: 4000 });
   }
+}
+
+/** Without these the page would say that the line stalls. */
+function isAcknowledgement(message: string | Buffer): boolean {
+  return typeof message === 'string' && JSON.parse(message).type === 'ack';
 }
