@@ -226,8 +226,10 @@ test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not m
   expect(await page.isDisabled('#talk')).toBe(false);
   await page.goForward();
   await page.waitForURL((url) => !url.href.startsWith(server.url), PATIENCE);
-  const back = page.locator('.way-back:visible').last(); // the header's has a veil before it until the talk begins
+  await page.waitForSelector('#overlay.gone', { state: 'attached', ...PATIENCE });
+  const back = page.locator('header .way-back');
   expect(await back.textContent()).toBe('Back to the studio');
+  await judge(page, 'talk of the studio');
   await back.click();
   await page.waitForSelector('#talk:visible');
   expect(await page.textContent('#title')).toBe('Ida');
