@@ -230,6 +230,10 @@ test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not m
   const back = page.locator('header .way-back');
   expect(await back.textContent()).toBe('Back to the studio');
   await judge(page, 'talk of the studio');
+  await page.setViewportSize({ width: 390, height: 844 });
+  const views = await page.locator('.views').boundingBox();
+  const link = await back.boundingBox();
+  expect(link!.y + link!.height).toBeLessThanOrEqual(views!.y);
   await back.click();
   await page.waitForSelector('#talk:visible');
   expect(await page.textContent('#title')).toBe('Ida');
