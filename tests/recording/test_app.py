@@ -1,12 +1,14 @@
 """The server of the studio page: who is let in, what is taken, and that deleting is deleting."""
 
 import errno
+from types import SimpleNamespace
 
 import pytest
 from starlette.testclient import TestClient
 
 from ico3d.chat.serving.sites import Sites
 from ico3d.cli import main
+from ico3d.creating.settings import QUALITIES
 from ico3d.errors import MissingModelError
 from ico3d.recording import app as server
 from ico3d.recording.guiding import seeing
@@ -196,6 +198,35 @@ def test_what_was_made_so_far_is_discarded_and_the_recordings_stay(page, room, v
     assert "made_of" not in made
     gone = page.delete("/recordings/Ida/making", params={"discard": True}).json()
     assert gone["making"] is None and _state(gone, "text-1") == "kept" and not folder.exists()
+
+
+def test_the_time_left_that_is_shown_counts_down_without_a_report(page, room, monkeypatch):
+    folder = Places(room.people.folder / "Ida").folder
+    folder.mkdir()
+    running = Progress("running", "quick", "track", left=300.0, later=100.0, told=1000.0)
+    monkeypatch.setattr(room.makers, "progress", lambda _: running)
+    for now, left in ((1000.0, 300.0), (1060.0, 240.0), (5000.0, 100.0)):
+        monkeypatch.setattr(server, "time", SimpleNamespace(time=lambda now=now: now))
+        shown = page.get("/recordings/Ida").json()["making"]
+        assert shown["left"] == left and not {"later", "told"} & shown.keys()
+
+
+def test_each_quality_says_how_long_it_takes_once_the_machine_is_known(page, room, video):
+    assert page.get("/recordings/Ida").json()["durations"] == {}
+    room.durations._step = 0.02
+    assert page.get("/recordings/Ida").json()["durations"] == {}  # nothing is recorded
+    durations = _send(page, "text-1", video).json()["durations"]
+    assert list(durations) == list(QUALITIES)
+    assert 0 < durations["quick"] < durations["good"] < durations["best"]
+
+
+def test_the_machine_is_measured_as_long_as_the_server_runs(room, monkeypatch):
+    done = []
+    for name in ("begin", "close"):
+        monkeypatch.setattr(room.durations, name, lambda name=name: done.append(name))
+    with _client(room):
+        assert done == ["begin"]
+    assert done == ["begin", "close"]
 
 
 def test_the_consent_that_is_taken_back_takes_along_what_is_being_made(page, room, video):

@@ -2,6 +2,7 @@ import type { Generator } from './gaussians/generator.ts';
 import './style.css';
 import { Server } from './server.ts';
 import { readSplats, type Splats } from './stage/webgl/readback.ts';
+import { showWayBack } from './ui/way-back.ts';
 import { Visit, type Presence } from './visit.ts';
 import { PageWords } from './words/page-words.ts';
 import { xrSettings } from './xr/settings.ts';
@@ -32,9 +33,11 @@ const visit: Visit = new Visit(document.body, new Server(new URL(location.href))
   reload: () => location.reload(),
   key: secrets.get('key'),
   unlock: (key) => {
-    location.hash = new URLSearchParams({ key }).toString();
+    secrets.set('key', key);
+    location.hash = secrets.toString();
     location.reload();
   },
 });
 
+showWayBack(document, location.hash, location);
 addEventListener('pagehide', ({ persisted }) => persisted || visit.dispose());

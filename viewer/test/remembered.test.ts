@@ -1,7 +1,7 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { afterEach, expect, test, vi } from 'vitest';
-import { remember, remembered } from '../src/remembered.ts';
+import { remember, remembered, rememberedInTab, rememberInTab } from '../src/remembered.ts';
 
 const SOURCES = join(import.meta.dirname, '../src');
 
@@ -13,6 +13,19 @@ test('a choice is remembered', () => {
   expect(remembered('theme')).toBeNull();
   remember('theme', 'light');
   expect([remembered('theme'), [...kept]]).toEqual(['light', [['ico3d-theme', 'light']]]);
+});
+
+test('what a tab keeps is kept nowhere else', () => {
+  const kept = new Map<string, string>();
+  const keeps = { getItem: (key: string) => kept.get(key) ?? null, setItem: (key: string, value: string) => kept.set(key, value) };
+  vi.stubGlobal('localStorage', undefined);
+  vi.stubGlobal('sessionStorage', keeps);
+  expect(rememberedInTab('studio-key')).toBeNull();
+  rememberInTab('studio-key', 'a-b');
+  expect([rememberedInTab('studio-key'), [...kept]]).toEqual(['a-b', [['ico3d-studio-key', 'a-b']]]);
+  vi.stubGlobal('sessionStorage', undefined);
+  expect(() => rememberInTab('studio-key', 'c-d')).not.toThrow();
+  expect(rememberedInTab('studio-key')).toBeNull();
 });
 
 test('where the browser keeps nothing, the page goes on without, and asks for it nowhere else', () => {

@@ -15,7 +15,7 @@ from ico3d.bundle.format import Bundle, give_voice
 from ico3d.bundle.persona import Persona, read_persona
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
-from ico3d.capture.portrait.settings import CUTOUTS, FACES, POSES, PortraitSettings
+from ico3d.capture.portrait.settings import PortraitSettings
 from ico3d.capture.portrait.track import track_portrait
 from ico3d.common.files import full_disk, write_atomic
 from ico3d.common.people.stated import NOT_STATED
@@ -25,8 +25,8 @@ from ico3d.creating.learning import learn
 from ico3d.creating.looking.examine import Examination, examine
 from ico3d.creating.measuring import measured
 from ico3d.creating.pace import set_pace
-from ico3d.creating.plan import check_room, expected
-from ico3d.creating.settings import QUALITIES, CreateSettings, Quality
+from ico3d.creating.plan import check_room, expected, tracking_spans
+from ico3d.creating.settings import QUALITIES, CreateSettings
 from ico3d.creating.voice.clone import Cloned, awaits_voice, clone
 from ico3d.creating.workplace import Workplace, workplace
 from ico3d.errors import CaptureError
@@ -34,8 +34,6 @@ from ico3d.head.model_folder import TrainedHead
 
 SIZE = 512
 """Upper limit of the pictures' short side in pixels."""
-TRACKED = {FACES: (0.0, 0.1), CUTOUTS: (0.1, 0.3), POSES: (0.3, 1.0)}
-"""Which share of tracking each of its steps begins and ends with."""
 QUALITY, STRIP = "quality.json", "strip.png"
 HEAD_ALONE = "head.ico3d"
 
@@ -74,9 +72,9 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
         quality = QUALITIES[settings.quality]
         found = _looked(settings, tell)
         voice = clone(settings, place, tell)
-        check_room(place.folder, quality, found)
+        check_room(place.folder, quality, found.seconds)
         tell(_planned(settings, place, found))
-        capture = _tracked(settings, place, quality, tell)
+        capture = _tracked(settings, place, found.seconds, tell)
         set_pace(settings.device)  # other programs may have come or gone
         head = learn(capture, place.head(settings.quality), settings, quality, tell)
         _measure(head, capture, place, settings, tell)
@@ -115,7 +113,7 @@ def _tell_share(tell: Tell, step: Step, doing: str, share: float) -> None:
 def _planned(settings: CreateSettings, place: Workplace, found: Examination) -> Planned:
     """How long everything takes at each quality, and what is left of the one that is wanted."""
     step = set_pace(settings.device)
-    plans = {name: expected(quality, found, step) for name, quality in QUALITIES.items()}
+    plans = {name: expected(one, found.seconds, step) for name, one in QUALITIES.items()}
     left = dict(plans[settings.quality])
     if place.capture(QUALITIES[settings.quality].tracking).exists():
         left["track"] = 0.0
@@ -124,13 +122,15 @@ def _planned(settings: CreateSettings, place: Workplace, found: Examination) -> 
     return Planned(left, {name: sum(plan.values()) for name, plan in plans.items()})
 
 
-def _tracked(settings: CreateSettings, place: Workplace, quality: Quality, tell: Tell) -> Capture:
-    """The tracked video."""
+def _tracked(settings: CreateSettings, place: Workplace, seconds: float, tell: Tell) -> Capture:
+    """The tracked video, which has so many seconds."""
+    quality = QUALITIES[settings.quality]
     folder = place.capture(quality.tracking)
     if not folder.exists():
+        spans = tracking_spans(quality, seconds)
 
         def reached(doing: str, share: float) -> None:
-            begin, end = TRACKED[doing]
+            begin, end = spans[doing]
             tell(Advanced("track", begin + share * (end - begin), doing))
 
         stated = (settings.out.stem, settings.consent, settings.licence)

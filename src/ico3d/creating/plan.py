@@ -3,10 +3,8 @@
 import shutil
 from pathlib import Path
 
-from ico3d.capture.portrait.photometric_poses import steps_for
-from ico3d.capture.portrait.settings import FPS
+from ico3d.capture.portrait.settings import CUTOUTS, FACES, FPS, POSES, steps_for
 from ico3d.creating.events import Step
-from ico3d.creating.looking.examine import Examination
 from ico3d.creating.settings import Quality
 from ico3d.errors import StorageError
 
@@ -23,38 +21,60 @@ SPARE = 0.4e9
 """Bytes that are to be free for everything else: checkpoints, previews, the avatar."""
 
 
-def pictures_of(quality: Quality, found: Examination) -> int:
-    """Number of pictures that are kept of a video."""
-    return min(quality.pictures, round(found.seconds * FPS))
+def pictures_of(quality: Quality, seconds: float) -> int:
+    """Number of pictures that are kept of a video of so many seconds."""
+    return min(quality.pictures, round(seconds * FPS))
 
 
-def expected(quality: Quality, found: Examination, step: float) -> dict[Step, float]:
+def expected(quality: Quality, seconds: float, step: float) -> dict[Step, float]:
     """Seconds that the steps from a video to an avatar will take, but for baking at the end.
 
     Args:
         quality: How much work goes into it.
-        found: What is known of the video.
+        seconds: Length of the video.
         step: Seconds of one step of the standard size.
     """
-    pictures = pictures_of(quality, found)
-    track = FACE * found.seconds * FPS + COLOURS + CUTOUT * pictures
-    if quality.refine:
-        track += REFINE * steps_for(pictures)
+    pictures = pictures_of(quality, seconds)
     return {
-        "track": step * track,
+        "track": step * sum(_tracking(quality, seconds).values()),
         "learn": step * LEARN * quality.head.steps,
         "measure": step * COMPARE * pictures / 11,
     }
 
 
-def check_room(folder: Path, quality: Quality, found: Examination) -> None:
-    """Refuses to begin what a disk cannot hold.
+def tracking_spans(quality: Quality, seconds: float) -> dict[str, tuple[float, float]]:
+    """Which share of tracking each of its steps begins and ends with, by the work that it is.
+
+    Args:
+        quality: How much work goes into it.
+        seconds: Length of the video.
+    """
+    works = _tracking(quality, seconds)
+    whole, done, spans = sum(works.values()), 0.0, {}
+    for name, work in works.items():
+        spans[name] = (done / whole, (done + work) / whole)
+        done += work
+    return spans
+
+
+def _tracking(quality: Quality, seconds: float) -> dict[str, float]:
+    """Work of the steps of tracking, as multiples of the standard step, in their order."""
+    pictures = pictures_of(quality, seconds)
+    return {
+        FACES: FACE * seconds * FPS,
+        CUTOUTS: COLOURS + CUTOUT * pictures,
+        POSES: REFINE * steps_for(pictures) if quality.refine else 0.0,
+    }
+
+
+def check_room(folder: Path, quality: Quality, seconds: float) -> None:
+    """Refuses to begin what a disk cannot hold of a video of so many seconds.
 
     Raises:
         StorageError: If there is too little room.
     """
-    everything = found.seconds * FPS  # all pictures lie there until some are chosen
-    needed = BYTES * max(everything / 2, pictures_of(quality, found)) + SPARE
+    everything = seconds * FPS  # all pictures lie there until some are chosen
+    needed = BYTES * max(everything / 2, pictures_of(quality, seconds)) + SPARE
     free = shutil.disk_usage(folder).free
     if free < needed:
         sizes = {"free": round(free / 1e9, 1), "needed": round(needed / 1e9, 1)}

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import time
 from collections import defaultdict
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ from ico3d.recording.keeping.body_choice import BUILDS, OUTFITS, as_form, chosen
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import CONSENT, part_ids, scripts
+from ico3d.recording.making.durations import Durations
 from ico3d.recording.making.makers import PACKAGED, Bodies, Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE
@@ -52,6 +54,7 @@ class Room:
         bodies: Which bodies avatars may get.
         makers: Processes that make avatars.
         talks: Servers of finished avatars.
+        durations: How long avatars take on this machine.
         voices: Whether people are asked if their voice may be cloned, too.
         locks: One for each person, so that nothing is written while something is deleted.
     """
@@ -61,6 +64,7 @@ class Room:
     bodies: Bodies
     makers: Makers
     talks: Talks
+    durations: Durations
     voices: bool
     locks: defaultdict[str, asyncio.Lock]
 
@@ -86,7 +90,9 @@ def make_app(room: Room, host: str, sites: Sites, names: tuple[str, ...] = ()) -
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         await asyncio.to_thread(room.makers.go_on)
+        room.durations.begin()
         yield
+        await asyncio.to_thread(room.durations.close)
         await asyncio.to_thread(room.makers.close)
         await asyncio.to_thread(room.talks.close)
         room.eye.close()
@@ -281,6 +287,7 @@ def _status(room: Room, person: Person) -> dict[str, Any]:
         "parts": parts,
         "covered": plain(covered(found.values(), language)),
         "making": _of_making(room, person),
+        "durations": dict(room.durations.of(person)),
         "body": as_form(room.bodies.choice(person)),
         "avatar": Places(person.folder).avatar.is_file(),
     }
@@ -291,8 +298,9 @@ def _of_making(room: Room, person: Person) -> dict[str, Any] | None:
     progress = room.makers.progress(person)
     if progress is None:
         return None
-    shown = plain(progress)
-    del shown["made_of"]
+    shown = plain(progress) | {"left": progress.left_at(time.time())}
+    for name in ("made_of", "later", "told"):
+        del shown[name]
     return shown | {"changed": room.makers.changed(person, progress)}
 
 
@@ -346,5 +354,6 @@ def open_room(
     """
     people = People(folder)
     people.clear()
-    servers = Makers(people, bodies), Talks(host, tls)
+    makers = Makers(people, bodies)
+    servers = makers, Talks(host, tls), Durations(makers.is_busy)
     return Room(people, Eye(), bodies, *servers, voices, defaultdict(asyncio.Lock))

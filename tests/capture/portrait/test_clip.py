@@ -8,7 +8,7 @@ import pytest
 
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
-from ico3d.capture.portrait import photometric_poses
+from ico3d.capture.portrait import settings as portrait_settings
 from ico3d.capture.portrait.settings import PortraitSettings
 from ico3d.capture.portrait.track import track_portrait
 from ico3d.cli import main
@@ -28,7 +28,7 @@ def model(monkeypatch):
     if not (MODELS / "face_landmarker.task").is_file():
         pytest.skip("face_landmarker.task is not here")
     monkeypatch.setenv("ICO3D_MODELS", str(MODELS))
-    monkeypatch.setattr(photometric_poses, "STEPS", (30, 30))  # its own test tells whether it helps
+    monkeypatch.setattr(portrait_settings, "STEPS", (30, 30))  # its own test tells whether it helps
 
 
 def _faceless(path: Path, frames: int = 6) -> Path:

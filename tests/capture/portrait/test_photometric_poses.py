@@ -6,6 +6,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from ico3d.capture.portrait import photometric_poses
+from ico3d.capture.portrait import settings as portrait_settings
 from ico3d.capture.portrait.photometric_poses import Look, refine_poses, rigid_motion
 from ico3d.common.camera import Camera
 from ico3d.splat.gaussians import Gaussians
@@ -48,7 +49,7 @@ def test_a_rigid_motion_is_rotation_vector_and_shift():
 
 def test_wrong_poses_are_put_right(monkeypatch):
     monkeypatch.setattr(photometric_poses, "COUNT", 700)
-    monkeypatch.setattr(photometric_poses, "STEPS", (450, 450))
+    monkeypatch.setattr(portrait_settings, "STEPS", (450, 450))
     random = np.random.default_rng(0)
     head = _head(random)
     true = [_pose(random.uniform(-12, 12, 3), random.normal(0, 0.004, 3)) for _ in range(12)]

@@ -10,6 +10,7 @@ import torch
 from ico3d.capture.face.mediapipe_face import LANDMARKS, MESH_LANDMARKS, CanonicalFace, Face
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait import photometric_poses, readings, track
+from ico3d.capture.portrait import settings as portrait_settings
 from ico3d.capture.portrait.files import save_picture, save_torso
 from ico3d.capture.portrait.parsing import FACE
 from ico3d.capture.portrait.rigid_head import Track
@@ -81,7 +82,7 @@ def video(tmp_path, monkeypatch):
     monkeypatch.setattr(track, "_save_mattes", _mattes)
     monkeypatch.setattr(track, "_points", lambda *_: _POINTS)
     monkeypatch.setattr(photometric_poses, "COUNT", 200)
-    monkeypatch.setattr(photometric_poses, "STEPS", (3, 3))
+    monkeypatch.setattr(portrait_settings, "STEPS", (3, 3))
     path = tmp_path / "me.mp4"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=25)

@@ -31,12 +31,13 @@ def test_events_become_steps_time_and_pictures(tmp_path):
     assert found is not None
     assert (found.left, found.advice, found.step) == (115.0, (BLUR,), "join")
     assert [one["code"] for one in found.refused] == ["face-none"]
+    clock[0] = 5.0
     tell(Advanced("track", 0.5, "…"))
     assert tell.progress.left == 110.0
     tell(Advanced("learn", 0.25, "…"))
     tell(Advanced("learn", 0.5, "…"))  # at once: not written
     assert (tell.progress.share, tell.progress.left) == (0.25, 80.0)
-    clock[0] = 2.0
+    clock[0] = 7.0
     tell(Advanced("learn", 0.75, "…"))
     assert (tell.progress.share, tell.progress.left) == (
         0.75,
@@ -49,6 +50,30 @@ def test_events_become_steps_time_and_pictures(tmp_path):
     found = read_progress(tmp_path)
     assert found == tell.progress
     assert (found.step, found.faces, found.decibels, found.left) == ("bake", 1, 30.5, 0.0)
+
+
+def test_the_time_left_counts_down_between_reports_to_what_later_steps_need(tmp_path):
+    clock = [0.0]
+    tell = Reporter(tmp_path, Progress("running", "quick"), *[lambda: clock[0]] * 2)
+
+    def shown():
+        found = read_progress(tmp_path)
+        assert found is not None
+        return found.left_at(clock[0])
+
+    tell.change()
+    assert shown() is None
+    tell(Planned({"track": 60.0, "learn": 100.0, "measure": 20.0}, {}))
+    for clock[0], left in ((0.0, 180.0), (1.5, 178.5), (40.0, 140.0), (90.0, 120.0)):
+        assert shown() == left
+    tell(Advanced("learn", 0.0, "…"))
+    clock[0] = 91.5
+    assert shown() == 118.5
+    tell(Preview(0.1, np.zeros((4, 8, 3), np.uint8)))  # says nothing of the time
+    clock[0] = 100.0
+    assert shown() == 110.0
+    clock[0] = 80.0  # set back
+    assert shown() == 120.0
 
 
 def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
@@ -70,6 +95,7 @@ def test_what_is_damaged_is_nothing(tmp_path):
     assert read_progress(tmp_path) is None
     whole = '{"state": "made", "quality": "good", "%s": %s}'
     odd = [whole % ("made_of", "3"), whole % ("decibels", "Infinity"), "[" * 100_000]
+    odd += [whole % ("told", '"x"'), whole % ("left", "[]"), whole % ("later", "9" * 400)]
     for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}', *odd):
         (tmp_path / "progress.json").write_text(text)
         assert read_progress(tmp_path) is None

@@ -114,6 +114,16 @@ test('a making that was stopped says where, and each of its buttons does what it
   expect(readdirSync(join(person, 'parts')).filter((name) => name.endsWith('.mp4'))).toEqual(['consent.mp4', 'left.mp4', 'text-1.mp4']);
 }, 120_000);
 
+test('how long each quality takes stands beside it once the server knows', async () => {
+  await open();
+  const quick = () => page.textContent('#quality [value=quick]');
+  await expect.poll(quick, PATIENCE).toMatch(/^quick, for a first impression \(about \d+ min\)$/);
+  await page.selectOption('#language', 'de');
+  expect(await quick()).toMatch(/^schnell, für einen ersten Eindruck \(etwa \d+ min\)$/);
+  expect(await page.inputValue('#quality')).toBe('good');
+  await judge(page, 'studio durations');
+}, 120_000);
+
 test('with other recordings nothing goes on, and that is said', async () => {
   progress('stopped', { made_of: { parts: [], on: [] } });
   await open();
@@ -200,6 +210,7 @@ test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not m
   await open();
   expect(await page.textContent('#made')).toBe('Ida is there');
   expect(await page.textContent('#made-of')).toBe('Recorded: all that is seen, head and shoulders.');
+  expect(await page.textContent('#decibels')).toBe('Very like the recording (31.2 dB on pictures it never saw)');
   await page.selectOption('#quality', 'quick');
   expect(await page.isDisabled('#go')).toBe(true);
   expect(await page.textContent('#first')).toMatch(/^It is there, made in just this way/);
@@ -213,6 +224,19 @@ test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not m
   expect(await page.textContent('#title')).toBe('Ida');
   expect(await page.textContent('#talk')).toBe('Talk with the avatar');
   expect(await page.isDisabled('#talk')).toBe(false);
+  await page.goForward();
+  await page.waitForURL((url) => !url.href.startsWith(server.url), PATIENCE);
+  await page.waitForSelector('#overlay.gone', { state: 'attached', ...PATIENCE });
+  const back = page.locator('header .way-back');
+  expect(await back.textContent()).toBe('Back to the studio');
+  await judge(page, 'talk of the studio');
+  await page.setViewportSize({ width: 390, height: 844 });
+  const views = await page.locator('.views').boundingBox();
+  const link = await back.boundingBox();
+  expect(link!.y + link!.height).toBeLessThanOrEqual(views!.y);
+  await back.click();
+  await page.waitForSelector('#talk:visible');
+  expect(await page.textContent('#title')).toBe('Ida');
 }, 200_000);
 
 test('a tab on somebody who was deleted elsewhere says so by itself, and a new recording can begin', async () => {

@@ -7,6 +7,7 @@ import './bodies.css';
 import { admit, byKey } from '../admission.ts';
 import { sentenceOf } from '../errors.ts';
 import { every } from '../lifetime.ts';
+import { rememberedInTab, rememberInTab } from '../remembered.ts';
 import { Server } from '../server.ts';
 import { byId } from '../ui/elements.ts';
 import { offerLanguages } from '../ui/sheets/languages.ts';
@@ -19,6 +20,7 @@ import { Place } from './place.ts';
 import { Recordings, Refusal, type Overview, type Status } from './recordings.ts';
 import { Room } from './room.ts';
 
+const KEY = 'studio-key'; // under which the tab keeps it: who comes back from the talk does not bring it
 const UNADMITTED = 401;
 const UNKNOWN = 404;
 const WATCHED = 5000; // ms between two looks whether somebody is still there, and what other tabs have changed
@@ -179,6 +181,7 @@ function showSentence(): void {
 async function enter(key: string | null): Promise<void> {
   try {
     if (key) await admit(server, byKey(server, key), say('error.key'), signal);
+    if (key) rememberInTab(KEY, key);
     await showPlace();
   } catch (error) {
     const isLocked = key !== null || (error instanceof Refusal && error.status === UNADMITTED);
@@ -232,4 +235,4 @@ document.addEventListener('visibilitychange', () => void watch());
 every(WATCHED, signal, () => void watch());
 offerLanguages(byId(root, 'language'), words, signal);
 followTheme(root, () => {}, signal);
-void enter(secrets.get('key'));
+void enter(secrets.get('key') ?? rememberedInTab(KEY));

@@ -56,6 +56,7 @@ export interface Status {
   making: Making | null;
   body: Body;
   avatar: boolean;
+  durations: Record<string, number>; // s that each quality takes; empty as long as nobody knows
 }
 
 /** Who is recorded, and what the server can do. */

@@ -68,10 +68,16 @@ export class Room {
     byId(this.root, 'lacking').hidden = lacking === '';
     const options = qualities.map((quality) => {
       const option = new Option(quality, quality, quality === 'good', quality === 'good');
-      this.ports.words.write(option, say(`studio.quality.${quality}` as Key));
+      this.ports.words.write(option, qualityOf(quality));
       return option;
     });
     byId(this.root, 'quality').replaceChildren(...options);
+  }
+
+  /** Says of each quality how long it takes, if that is known. */
+  private writeQualities({ durations }: Status): void {
+    const { options } = byId<HTMLSelectElement>(this.root, 'quality');
+    for (const option of options) this.ports.words.write(option, qualityOf(option.value, durations[option.value]));
   }
 
   /**
@@ -335,6 +341,7 @@ export class Room {
   /** Shows whether the avatar can be made, and what the button does. */
   private writeMake(status: Status): void {
     const { words } = this.ports;
+    this.writeQualities(status);
     const ready = this.isReady(status);
     const { making } = status;
     const isSame = making?.state === 'made' && making.changed.length === 0 && making.quality === this.quality;
@@ -371,6 +378,16 @@ export class Room {
   private isComplete({ parts }: Status): boolean {
     return parts.every(({ id, state }) => id === UPLOAD || state === 'kept');
   }
+}
+
+/**
+ * What a quality is called.
+ *
+ * @param seconds that it takes, if anybody knows
+ */
+export function qualityOf(quality: string, seconds?: number): Sentence {
+  const name = say(`studio.quality.${quality}` as Key);
+  return seconds === undefined ? name : say('studio.quality.time', { quality: name, n: Math.max(Math.round(seconds / 60), 1) });
 }
 
 /** Whether a making has ended without an avatar. */

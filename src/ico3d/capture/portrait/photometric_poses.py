@@ -14,7 +14,7 @@ import torch
 from rich.console import Console
 from torch import Tensor, nn
 
-from ico3d.capture.portrait.settings import POSES
+from ico3d.capture.portrait.settings import POSES, steps_for
 from ico3d.capture.progress import Reached, tracked
 from ico3d.common.camera import Camera
 from ico3d.common.device import DeviceName
@@ -28,10 +28,6 @@ console = Console(stderr=True)
 
 COUNT = 8_000
 """Number of Gaussians of the cloud."""
-VISITS = 25
-"""Number of times that each frame is used."""
-STEPS = (2_000, 30_000)
-"""Limits of the number of steps: short clips need more visits per frame, long ones fewer."""
 WARM_UP = 0.05
 """Share of the steps with fixed poses, because an untrained cloud cannot correct them."""
 RATES = {"means": 1e-2, "quats": 2e-2, "log_scales": 3e-2, "colors": 5e-2, "opacities": 5e-2}
@@ -153,11 +149,6 @@ def refine_poses(
         explained = image + head[..., None] * (picture - image)  # (H, W, 3)
         fit.update(photometric(explained[None], image[None]), step)
     return _refined(poses, cloud.corrections.weight.detach().cpu().double())
-
-
-def steps_for(frames: int) -> int:
-    """Number of steps by which the poses of so many frames are corrected."""
-    return int(np.clip(VISITS * frames, *STEPS))
 
 
 class _Fit:

@@ -9,6 +9,16 @@ FPS = 25.0
 """Pictures per second of a portrait capture."""
 FACES, CUTOUTS, POSES = "finding the face", "cutting out the person", "refining the poses"
 """Names of the steps whose progress is told, in their order."""
+VISITS = 25
+"""Number of times that each frame is used while poses are corrected."""
+STEPS = (2_000, 30_000)
+"""Limits of the number of these steps: short clips need more visits per frame, long ones fewer."""
+
+
+def steps_for(frames: int) -> int:
+    """Number of steps by which the poses of so many frames are corrected."""
+    least, most = STEPS
+    return min(max(VISITS * frames, least), most)
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,12 @@ class Estimate:
         whole = self._whole(planned, share - self._first, now - self._began)
         if step in EVEN and planned:
             self._slower = whole / planned
-        later = sum(self._plan.get(one, 0.0) for one in STEPS[STEPS.index(step) + 1 :])
-        return whole * (1 - share) + later * self._slower
+        return whole * (1 - share) + self.later(step)
+
+    def later(self, step: Step) -> float:
+        """Expected seconds of the steps after one."""
+        after = STEPS[STEPS.index(step) + 1 :]
+        return sum(self._plan.get(one, 0.0) for one in after) * self._slower
 
     def _whole(self, planned: float, done: float, seconds: float) -> float:
         """Expected seconds of a whole step, a part of which was seen to take some seconds."""

@@ -111,8 +111,7 @@ class Makers:
             said = "nothing is recorded: record some parts, or choose a video."
             raise Refused("nothing", said, 409)
         with self._lock:
-            busy = [name for name, one in self._running.items() if one.poll() is None]
-            if busy:
+            if busy := self._busy():
                 raise Refused("busy", f"an avatar of {busy[0]} is being made: wait for it.", 409)
             folder = Places(person.folder).folder
             if anew:
@@ -126,6 +125,15 @@ class Makers:
             with log_file.open("ab") as log:
                 words = [str(person.folder), quality, *of["on"]]
                 self._running[person.name] = start(self._worker, words, log)
+
+    def is_busy(self) -> bool:
+        """Whether an avatar is being made."""
+        with self._lock:
+            return bool(self._busy())
+
+    def _busy(self) -> list[str]:
+        """Of whom an avatar is being made, for somebody who holds the lock."""
+        return [name for name, one in self._running.items() if one.poll() is None]
 
     def progress(self, person: Person) -> Progress | None:
         """How far somebody's avatar is; None where none was begun."""

@@ -32,6 +32,8 @@ class Progress:
         step: What is being done; `join` before the steps of `ico3d create`.
         share: How much of that is done, 0 to 1.
         left: Expected seconds of all that is left but baking; None where nobody knows yet.
+        later: Those of them that belong to the steps after this one.
+        told: When that was so, in seconds since 1970.
         advice: What would make it better, each as `plain` writes an `Advice`.
         refused: Why nothing can be made of the video, likewise; empty where something can.
         faces: Number of pictures of the face that have been shown.
@@ -47,6 +49,8 @@ class Progress:
     step: Step | Literal["join"] = "join"
     share: float = 0.0
     left: float | None = None
+    later: float = 0.0
+    told: float = 0.0
     advice: tuple[dict[str, Any], ...] = ()
     refused: tuple[dict[str, Any], ...] = ()
     faces: int = 0
@@ -55,6 +59,19 @@ class Progress:
     values: dict[str, float | str] = field(default_factory=dict)
     decibels: float | None = None
     made_of: dict[str, Any] = field(default_factory=dict)
+
+    def left_at(self, now: float) -> float | None:
+        """Expected seconds that are left at a time, however long nothing was reported.
+
+        Time passes of the step that goes on alone: what later steps need stays.
+
+        Args:
+            now: The time in seconds since 1970.
+        """
+        if self.left is None:
+            return None
+        passed = max(now - self.told, 0.0)  # a clock may be set back
+        return max(self.left - passed, min(self.later, self.left))
 
     def is_of(self, id: str) -> bool:
         """Whether the avatar is made of a part; also where it is not known of which."""
@@ -70,9 +87,11 @@ def read_progress(folder: Path) -> Progress | None:
     try:
         data = read_small(folder / FILE, links=False)
         found = Progress(**parse_json(data, FILE, ValueError))
-        of = dict(found.made_of)
-        return replace(found, advice=tuple(found.advice), refused=tuple(found.refused), made_of=of)
-    except (OSError, ValueError, TypeError, KeyError):
+        left = None if found.left is None else float(found.left)
+        numbers = {"left": left, "later": float(found.later), "told": float(found.told)}
+        lists = {"advice": tuple(found.advice), "refused": tuple(found.refused)}
+        return replace(found, made_of=dict(found.made_of), **numbers, **lists)
+    except (OSError, ValueError, TypeError, KeyError, OverflowError):
         return None
 
 
@@ -106,11 +125,13 @@ class Reporter:
         folder: Where it is kept, with the latest picture of the face.
         progress: What is known.
         now: Returns the time in seconds.
+        date: Returns the seconds since 1970, which the server's process knows, too.
     """
 
     folder: Path
     progress: Progress
     now: Callable[[], float] = time.monotonic
+    date: Callable[[], float] = time.time
     _estimate: Estimate | None = None
     _written: float = float("-inf")
 
@@ -123,7 +144,7 @@ class Reporter:
             self.change(advice=(*self.progress.advice, plain(event.why)))
         elif isinstance(event, Planned):
             self._estimate = Estimate(event.seconds)
-            self.change(left=sum(event.seconds.values()))
+            self.change(**self._left("track", 0.0))  # which begins now
         elif isinstance(event, Advanced):
             self._advance(event.step, event.share)
         elif isinstance(event, Preview):
@@ -131,7 +152,7 @@ class Reporter:
             write_atomic(self.folder / FACE, lambda file: image.save(file, quality=88))
             self.change(faces=self.progress.faces + 1)
         elif isinstance(event, Made):
-            self.change(step="bake", share=1.0, left=0.0, decibels=event.measured.face)
+            self.change(step="bake", share=1.0, left=0.0, later=0.0, decibels=event.measured.face)
 
     def change(self, **values) -> None:
         """Writes what has changed."""
@@ -143,8 +164,15 @@ class Reporter:
         """Notes how much of a step is done; of a step that goes on only now and then."""
         if step == self.progress.step and share < 1 and self.now() - self._written < OFTEN:
             return
-        left = self._estimate and round(self._estimate.left(step, share, self.now()), 1)
-        self.change(step=step, share=round(share, 4), left=left)
+        self.change(step=step, share=round(share, 4), **self._left(step, share))
+
+    def _left(self, step: Step, share: float) -> dict[str, float]:
+        """What is known of the time that is left, of which a share of a step is done."""
+        if self._estimate is None:
+            return {}
+        left = self._estimate.left(step, share, self.now())
+        later = self._estimate.later(step)
+        return {"left": round(left, 1), "later": round(later, 1), "told": self.date()}
 
 
 def _of(advice: Sequence[Advice], level: Level) -> tuple[dict[str, Any], ...]:

@@ -14,6 +14,13 @@ def sources(person: Person) -> list[Path]:
     return [parts[id] for id in ids if id in parts and id != CONSENT]
 
 
+def recorded_seconds(person: Person) -> float:
+    """Length of the video that an avatar would be made of; 0 where nothing is recorded."""
+    names = {file.stem for file in sources(person)}
+    reports = (part.report for part in person.parts() if part.id in names)
+    return sum(float(report["seconds"]) for report in reports if report is not None)
+
+
 def signature(files: Sequence[Path]) -> list[list]:
     """What tells these files from others, and from other takes under the same names."""
     return [[file.name, file.stat().st_size, file.stat().st_mtime] for file in files]
