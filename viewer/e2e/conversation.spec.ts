@@ -1,6 +1,9 @@
+import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
 import { readRecord, type Record } from '../support/browser/recorder.ts';
+import { runPython } from '../support/python.ts';
+import { scratchFolder } from '../support/scratch.ts';
 import { slowness } from '../support/slowness.ts';
 import { finished, openPage, SENTENCE, SHORTER, SILENCE, until } from '../support/browser/talk.ts';
 
@@ -97,6 +100,21 @@ test('without a microphone the page says so and typing goes on', async () => {
   await notice.waitFor();
   expect(await notice.textContent()).toMatch(/microphone .* type instead\.$|type instead\.$/);
   expect(await browser.page.getAttribute('#microphone', 'aria-pressed')).toBe('false');
+  await browser.close();
+});
+
+test('while the microphone is open the page says that the visitor may speak', async () => {
+  const silence = join(scratchFolder(), 'silence.wav');
+  runPython('sound/voice.py', silence, '30');
+  const browser = await openPage(talkingUrl, { microphone: silence });
+  const { page } = browser;
+  const says = (text: string) => page.waitForFunction((text) => document.getElementById('state')!.textContent === text, text);
+  await until(browser, finished(0), 30_000);
+  await says('Ready');
+  await page.click('#microphone');
+  await says('Speak or type');
+  await page.click('#microphone');
+  await says('Ready');
   await browser.close();
 });
 

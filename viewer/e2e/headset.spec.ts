@@ -269,6 +269,17 @@ describe('a talk by headset', () => {
     await page.waitForFunction(() => document.getElementById('talk')!.ariaPressed === 'false');
   });
 
+  test('other tools come with their own hint', async () => {
+    const uses = (tool: 'hand' | 'controller') => page.evaluate((tool) => void (window.headset.primaryInputMode = tool), tool);
+    const text = () => page.evaluate(() => window.immersion().board.text);
+    await uses('hand');
+    await page.waitForFunction(() => window.immersion().board.text.includes('Pinch and hold to talk.'));
+    expect(await text()).toContain('menu leaves'); // hands have no button for it
+    await uses('controller');
+    await page.waitForFunction(() => !window.immersion().board.text.includes('Pinch and hold'));
+    expect(await text()).not.toContain('Hold the trigger'); // that one was followed
+  });
+
   test('her voice comes from where she is, until the device ends the visit', async () => {
     const ears = (turn: number) => page.evaluate(async (turn) => {
       const { player } = window.ico3d!.conversation!;

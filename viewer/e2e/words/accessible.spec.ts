@@ -35,6 +35,10 @@ test('axe finds nothing serious in any state of the page', async () => {
   await pauseDrawing(page);
   await page.waitForSelector('#choices:visible');
   await judge(page, 'invitation');
+  for (let i = 0; i < 4; i++) {
+    await page.keyboard.press('Tab'); // behind the cover nothing can be clicked, so nothing is reached either
+    expect(await page.evaluate(() => document.activeElement!.id)).toMatch(/^(start|start-typing)?$/);
+  }
   await page.click('#start-typing');
   await page.waitForFunction(() => document.querySelector('#answer')!.textContent === 'Hello.');
   await page.fill('#text', 'tell me about yourself');

@@ -103,6 +103,20 @@ describe('an answer', () => {
     expect(last.endsWith((await page.textContent('#answer'))!)).toBe(true);
   });
 
+  test('is read to its end when a phone is turned', async () => {
+    const { page } = browser;
+    const before = await page.textContent('#answer');
+    const atEnd = () => page.evaluate(() => {
+      const { scrollTop, clientHeight, scrollHeight } = document.getElementById('answer')!;
+      return { more: scrollHeight > clientHeight + 1, left: Math.round(scrollHeight - clientHeight - scrollTop) };
+    });
+    await page.evaluate(() => (document.querySelector('#answer span')!.textContent = 'Words that fill lines, and more of them. '.repeat(4)));
+    await page.setViewportSize({ width: 844, height: 390 });
+    await expect.poll(atEnd).toEqual({ more: true, left: 0 });
+    await page.setViewportSize({ width: 1280, height: 720 });
+    await page.evaluate((text) => (document.querySelector('#answer span')!.textContent = text), before);
+  });
+
   test.each(['', 'small', 'large'])('shows whole lines, the last one among them (%s)', async (size) => {
     const { page } = browser;
     const shown = await page.evaluate((size) => {

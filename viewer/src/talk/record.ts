@@ -91,6 +91,31 @@ export class TalkRecord {
   }
 }
 
+/** A sentence as far as it has come, of which some units may not have been heard. */
+export type Heard = Pick<Progress, 'text' | 'heard'>;
+
+/**
+ * Puts the clauses of a sentence together: answers come clause by clause, and a reader who sees
+ * the last clause alone has lost the beginning.
+ */
+export class RunningSentence {
+  private before = ''; // clauses of the sentence that were spoken before the present one
+  private present: Progress | null = null;
+
+  /** More of a clause has been heard; gives the whole sentence up to its end. */
+  follow(progress: Progress): Heard {
+    const { present } = this;
+    if (present && (present.utterance !== progress.utterance || present.first !== progress.first)) {
+      const follows = present.utterance === progress.utterance && present.first < progress.first; // numbers may start anew
+      const goesOn = follows && !ENDED.test(present.text);
+      this.before = goesOn ? joined([this.before, present.text.trim()]) : '';
+    }
+    this.present = progress;
+    const text = joined([this.before, progress.text]);
+    return { text, heard: text.length - progress.text.length + progress.heard };
+  }
+}
+
 function joined(sentences: readonly string[]): string {
   return sentences.filter(Boolean).reduce((text, sentence) => (!text || JOINED.test(text) ? text + sentence : `${text} ${sentence}`), '');
 }

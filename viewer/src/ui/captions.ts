@@ -1,4 +1,6 @@
+import { atEnd } from '../lifetime.ts';
 import type { Progress } from '../talk/captioning.ts';
+import { RunningSentence } from '../talk/record.ts';
 import { byId } from './elements.ts';
 
 /** What the visitor asked and the sentence that the avatar says, word by word as it is heard; then all that was said. */
@@ -8,16 +10,23 @@ export class Captions {
   private readonly answered: HTMLElement;
   private readonly heardWords = document.createElement('span');
   private readonly nextWords = document.createElement('span'); // keep their place, so that no line jumps
+  private readonly sentence = new RunningSentence();
   private utterance: number | null = null; // that is heard
 
-  /** @param lang language of the talk; empty if it is unknown */
-  constructor(root: ParentNode, lang: string) {
+  /**
+   * @param lang language of the talk; empty if it is unknown
+   * @param signal ends the following of the present line
+   */
+  constructor(root: ParentNode, lang: string, signal: AbortSignal) {
     this.root = byId(root, 'captions');
     this.asked = byId(root, 'question');
     this.answered = byId(root, 'answer');
     this.root.lang = lang;
     this.nextWords.className = 'unheard';
     this.answered.append(this.heardWords, this.nextWords);
+    const observer = new ResizeObserver(() => this.scroll()); // lines break anew: a phone was turned
+    observer.observe(this.answered);
+    atEnd(signal, () => observer.disconnect());
   }
 
   question(text: string, final: boolean): void {
@@ -27,8 +36,9 @@ export class Captions {
     if (final || this.utterance === null) this.write('', ''); // what is asked now is not what was answered
   }
 
-  heard({ utterance, text, heard }: Progress): void {
-    this.utterance = utterance;
+  heard(progress: Progress): void {
+    const { text, heard } = this.sentence.follow(progress);
+    this.utterance = progress.utterance;
     this.root.hidden = false;
     this.write(text.slice(0, heard), text.slice(heard));
   }
@@ -47,8 +57,13 @@ export class Captions {
   private write(heard: string, next: string): void {
     this.heardWords.textContent = heard;
     this.nextWords.textContent = next;
+    this.scroll();
+  }
+
+  /** The present line is the last one seen. */
+  private scroll(): void {
     const { answered, nextWords } = this;
     const line = parseFloat(getComputedStyle(answered).lineHeight);
-    answered.scrollTop = nextWords.offsetTop + line - answered.clientHeight; // the present line is the last one seen
+    answered.scrollTop = nextWords.offsetTop + line - answered.clientHeight;
   }
 }

@@ -40,6 +40,7 @@ export class Overlay {
     this.waiting = byId(page, 'overlay-wait');
     this.button = byId(page, 'again');
     this.reload = reload;
+    this.cover(true);
     atEnd(signal, () => clearTimeout(this.counting));
   }
 

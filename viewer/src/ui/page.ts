@@ -36,7 +36,7 @@ export function makePage(
   figures: () => Figures,
   signal: AbortSignal,
 ): Page {
-  const captions = new Captions(root, talker.lang);
+  const captions = new Captions(root, talker.lang, signal);
   const controls = new Controls(root, words, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
@@ -45,11 +45,16 @@ export function makePage(
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
   const sheet = new ServiceSheet(root, words, (offer) => choose(offer));
+  let hears = false; // whether the microphone is open
+  let now: Parameters<ConversationView['state']>[0] | null = null;
+  const tellState = () => {
+    if (now) words.write(byId(root, 'state'), say(now === 'idle' && hears ? 'state.open' : `state.${now}`));
+  };
   const announce = () => ['idle', 'ended'].includes(root.dataset.state!) && transcript.announce(settings.announces);
   const view: ConversationView = {
     state(state) {
-      root.dataset.state = state;
-      words.write(byId(root, 'state'), say(`state.${state}`));
+      root.dataset.state = now = state;
+      tellState();
       controls.setSpeaking(state === 'speaking');
       if (state === 'connecting') overlay.reconnect();
       announce();
@@ -77,7 +82,11 @@ export function makePage(
     memory: (offered, tell) => memory.offer(offered, tell),
     notice: (sentence) => showNotice(root, words, sentence),
     sharesVoice: (shared) => (byId(root, 'shared-voice').hidden = !shared),
-    microphone: (state) => controls.setMicrophone(state),
+    microphone(state) {
+      hears = state === 'open';
+      tellState();
+      controls.setMicrophone(state);
+    },
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),

@@ -29,24 +29,20 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   /** What is shown now. */
   text = '';
   private readonly page: ParentNode;
-  private hint: string;
+  private hint = '';
   private way = ''; // back to who is not seen
   private readonly canvas = document.createElement('canvas');
   private readonly texture: THREE.Texture;
   private readonly observer = new MutationObserver(() => this.write());
 
-  /**
-   * @param page where the captions and notices are
-   * @param hint is shown, too, until it is followed
-   */
-  constructor(page: ParentNode, hint: string) {
+  /** @param page where the captions and notices are */
+  constructor(page: ParentNode) {
     const canvas = document.createElement('canvas');
     const texture = new THREE.Texture(canvas);
     texture.colorSpace = THREE.SRGBColorSpace;
     const material = new THREE.MeshBasicMaterial({ map: texture, transparent: true, depthWrite: false });
     super(new THREE.PlaneGeometry(WIDE, (WIDE * HEIGHT) / WIDTH), material);
     this.page = page;
-    this.hint = hint;
     this.canvas = canvas;
     this.texture = texture;
     this.renderOrder = 1; // over the Gaussians
@@ -57,10 +53,10 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     this.write();
   }
 
-  /** The visitor knows what the hint says. */
-  dropHint(): void {
-    if (!this.hint) return;
-    this.hint = '';
+  /** Says how the visitor talks, goes and leaves; nothing by an empty text. */
+  advise(hint: string): void {
+    if (hint === this.hint) return;
+    this.hint = hint;
     this.write();
   }
 

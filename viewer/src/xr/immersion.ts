@@ -2,7 +2,7 @@ import * as THREE from 'three';
 import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
 import type { Presentation } from '../stage/presentation.ts';
-import { say, type Message } from '../words/text.ts';
+import { say, type Key, type Message } from '../words/text.ts';
 import { Arc } from './teleport.ts';
 import { Board } from './board.ts';
 import { Glance } from './glance.ts';
@@ -42,6 +42,7 @@ export class Immersion implements Presentation {
   private readonly head = new THREE.Matrix4(); // of the visitor, in the headset's space
   private aim: { by: XRInputSource; at: THREE.Vector3 } | null = null; // m in the headset's space
   private met = false;
+  private readonly followed = new Set<Key>(); // hints after which the visitor has talked
   private unseen = 0; // s for which the avatar has been out of sight
 
   /**
@@ -76,7 +77,7 @@ export class Immersion implements Presentation {
   }
 
   private constructor(session: XRSession, mode: XrMode, ports: XrPorts) {
-    const { stage, conversation, head, root, words } = ports;
+    const { stage, conversation, head, root } = ports;
     const meeting = stage.meeting!;
     this.session = session;
     this.ports = ports;
@@ -86,7 +87,8 @@ export class Immersion implements Presentation {
     this.rate = HELD * (session.frameRate ?? USUAL_RATE);
     this.rig = new Rig(meeting.ground, meeting.eyes);
     this.camera = this.rig.camera;
-    this.board = new Board(root, conversation ? words.text(this.hint()) : '');
+    this.board = new Board(root);
+    this.advise();
     this.voice = conversation ? new VoiceInSpace(conversation.player) : null;
     this.glance = head && !meeting.stands ? new Glance(meeting) : null;
     if (this.glance) head!.motion = () => this.glance!.motion();
@@ -134,7 +136,10 @@ export class Immersion implements Presentation {
     };
     hear('selectstart', ({ inputSource }) => this.talk(inputSource));
     hear('selectend', ({ inputSource }) => this.silence(inputSource));
-    session.addEventListener('inputsourceschange', ({ removed }) => removed.forEach((source) => this.silence(source)), { signal });
+    session.addEventListener('inputsourceschange', ({ removed }) => {
+      removed.forEach((source) => this.silence(source));
+      this.advise(); // another tool is used in another way; headsets name them only after the visit has begun
+    }, { signal });
     session.addEventListener('visibilitychange', () => session.visibilityState !== 'visible' && this.hush(), { signal });
     ports.stage.renderer.xr.getReferenceSpace()?.addEventListener('reset', () => (this.met = false), { signal });
     ports.stage.renderer.domElement.addEventListener('webglcontextlost', end, { signal });
@@ -146,7 +151,8 @@ export class Immersion implements Presentation {
 
   private talk(source: XRInputSource): void {
     this.tools.talking.add(source);
-    this.board.dropHint();
+    this.followed.add(this.hint().key);
+    this.advise();
     void this.ports.conversation?.press();
   }
 
@@ -233,6 +239,13 @@ export class Immersion implements Presentation {
   /** Where the visitor looks, in the headset's space. */
   private ahead(): THREE.Vector3 {
     return new THREE.Vector3(0, 0, -1).transformDirection(this.head);
+  }
+
+  /** Tells how the present tools are used, until the visitor has talked by them. */
+  private advise(): void {
+    const { conversation, words } = this.ports;
+    const hint = this.hint();
+    this.board.advise(conversation && !this.followed.has(hint.key) ? words.text(hint) : '');
   }
 
   private hint(): Message {
