@@ -16,6 +16,7 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.frames import MicrophoneFrame, PageFrame, TypedFrame
 from ico3d.chat.page import Page
+from ico3d.chat.services.recognition.room import Room
 from ico3d.chat.wire.protocol import MICROPHONE_RATE, Audio, ClientMessage, Transcript
 
 
@@ -70,6 +71,7 @@ class PageInput(FrameProcessor):
 class Captions(FrameProcessor):
     """Sends transcripts and the listening state to the page; stands behind the recogniser.
 
+    It lets no more words of a turn pass than a typed question may have, whoever recognised them.
     Words spoken over the avatar's voice are shown only once they have become a turn.
     """
 
@@ -78,16 +80,18 @@ class Captions(FrameProcessor):
         super().__init__()
         self._page = page
         self._words = ""  # of the pieces of this turn that are final
-        self._in_turn = False
+        self._room, self._in_turn = Room(), False
         self._early: Transcript | None = None  # of a voice that may become a turn
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Watches frames in both directions; the aggregator's frames come from further down."""
         await super().process_frame(frame, direction)
         if isinstance(frame, InterimTranscriptionFrame | TranscriptionFrame):
+            self._shorten(frame)
             self._transcribed(frame.text, isinstance(frame, TranscriptionFrame))
         elif isinstance(frame, VADUserStartedSpeakingFrame) and not self._in_turn:
             self._words, self._early = "", None
+            self._room.clear()  # what was said before has become no turn
         elif isinstance(frame, UserStartedSpeakingFrame):
             self._begin()
         elif isinstance(frame, UserStoppedSpeakingFrame):
@@ -95,6 +99,7 @@ class Captions(FrameProcessor):
             if self._page.state == "listening":  # else an apology has begun meanwhile
                 self._page.show("thinking" if self._words else "idle")
             self._words = ""
+            self._room.clear()
         await self.push_frame(frame, direction)
 
     def _begin(self) -> None:
@@ -103,6 +108,13 @@ class Captions(FrameProcessor):
         if self._early is not None:
             early, self._early = self._early, None
             self._show(early)
+
+    def _shorten(self, frame: InterimTranscriptionFrame | TranscriptionFrame) -> None:
+        """Leaves what has room in the turn; a blank, which may end it, in place of the rest."""
+        if frame.text.strip():
+            is_final = isinstance(frame, TranscriptionFrame)
+            cut = self._room.take if is_final else self._room.fit
+            frame.text = cut(frame.text) or " "
 
     def _transcribed(self, text: str, final: bool) -> None:
         """Takes a transcript, which may hold no words: they tell only that it was listened."""

@@ -165,6 +165,16 @@ def test_an_answer_without_end_is_not_read_and_a_small_one_not_made_large():
     assert answer.text == ""
 
 
+def test_no_proxy_gets_what_is_for_the_server(monkeypatch):
+    with answering({}, [b"a proxy"]) as proxy, answering({}, [b"the server"]) as url:
+        for name in ("HTTP_PROXY", "http_proxy", "ALL_PROXY", "all_proxy"):
+            monkeypatch.setenv(name, proxy)
+        for name in ("NO_PROXY", "no_proxy"):
+            monkeypatch.delenv(name, raising=False)
+        with fetching.client_of(url) as client:
+            assert fetching.fetch(client, "/").text == "the server"
+
+
 async def test_what_breaks_off_is_a_finding():
     with answering({"Content-Length": "10"}, [b"x"]) as url:
         found = await looked_at(url)

@@ -167,9 +167,26 @@ def test_of_what_others_log_the_constant_part_is_shown(log):
         f"WARNING: {here}: Empty answer to …",
         f"ERROR: {here}: …: got … words, too many",
         f"ERROR: {here}",
-        "WARNING: someone: cannot bind %s",
+        "WARNING: someone: cannot bind …",
         "ERROR: someone: in …: ValueError",
         f"ERROR: {here}: it broke: ValueError",
+    ]
+
+
+def test_of_what_others_fill_in_numbers_are_shown(log):
+    _, file, _ = log
+    someone, said = logging.getLogger("someone"), "my secret"
+    someone.error("Cancel %s running task(s), timeout graceful shutdown exceeded", 2)
+    someone.error(
+        "%(count)d of %(what)s at 100%% in %(long).2f s", {"count": 3, "what": said, "long": 0.5}
+    )
+    someone.error("%-8s took %05.1f of %*d at %d", said, 1.25, 4, 7, 8)
+    someone.error("100% of it: %s")
+    assert records(file) == [
+        "ERROR: someone: Cancel 2 running task(s), timeout graceful shutdown exceeded",
+        "ERROR: someone: 3 of … at 100% in 0.5 s",
+        "ERROR: someone: … took 1.25 of 7 at 8",
+        "ERROR: someone: 100% of it: %s",
     ]
 
 

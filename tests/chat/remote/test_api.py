@@ -16,7 +16,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.chat.remote import door
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.remote.recognition import read_wav
-from ico3d.chat.services.voice import espeak
+from ico3d.chat.services.voice import espeak, lasting
 from ico3d.errors import ProtocolError
 from support.chat.remote import (
     make_language,
@@ -250,6 +250,39 @@ async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
                 assert (await http.get("v1/models")).status_code == 429
                 while (await http.get("v1/models")).status_code == 429:
                     await asyncio.sleep(0.2)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "kind", "body", "status"),
+    [
+        ("POST", "chat/completions", "application/json", b'{"a": ', 400),
+        ("POST", "chat/completions", "application/json", b"\xff\xfe{", 400),
+        ("POST", "chat/completions", "application/json", b"[" * 100_000, 400),
+        ("POST", "audio/transcriptions", "multipart/form-data; boundary=x", b"--y\r\n", 400),
+        ("POST", "audio/transcriptions", "multipart/form-data", b"x", 400),
+        ("GET", "chat/completions", "application/json", b"", 405),
+        ("POST", "nothing", "application/json", b"{}", 404),
+    ],
+)
+async def test_whatever_is_wrong_is_told_in_the_form_of_the_api(method, path, kind, body, status):
+    served = "recognition" if path.startswith("audio") else "language"
+    make = make_recognition if served == "recognition" else make_language
+    async with serving(service_app(served, make)) as url, visiting(url) as http:
+        headers = {"Content-Type": kind}
+        answer = await http.request(method, f"v1/{path}", content=body, headers=headers)
+    assert answer.status_code == status
+    told = answer.json()["error"]
+    assert told["message"].endswith(".") and told["type"] == "invalid_request_error"
+
+
+async def test_a_voice_without_end_is_ended(monkeypatch):
+    monkeypatch.setattr(lasting, "LEAST", 1.0)
+    monkeypatch.setattr(lasting, "LETTER", 0.0)
+    asked = {"input": "This sentence takes two seconds, or a little more than that, to say."}
+    async with serving(service_app("voice", make_voice)) as url, visiting(url) as http:
+        answer = await http.post("v1/audio/speech", json=asked)
+    assert answer.status_code == 502
+    assert answer.json()["error"]["message"] == "its sound is much longer than the text."
 
 
 async def test_a_request_of_thousands_of_tools_or_messages_is_refused():

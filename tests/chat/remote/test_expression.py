@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import itertools
 import json
 
 import numpy as np
@@ -11,6 +12,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.bundle.format import SPEECH
 from ico3d.chat.performing.remote_mouth import AVOIDED, RemoteMouth
+from ico3d.chat.remote import expression
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.settings.conversation import ChatSettings, Expression
 from ico3d.chat.wire.protocol import End, Speech, Text
@@ -161,6 +163,68 @@ async def test_the_socket_is_guarded(bundle):
             with pytest.raises(ConnectionClosed) as closed:
                 await socket.recv()
             assert closed.value.rcvd.code == 1008
+
+
+PIECE = bytes(4800)
+
+
+def sayings(kind):
+    """Messages that cost a server much and their sender nothing, or too many of the honest ones."""
+    if kind == "pieces":
+        return itertools.repeat(b"xx")
+    words = {"starts": ["start"], "empty": [b""], "finishes": ["start", "finish"]}
+    return itertools.cycle(words[kind])
+
+
+@pytest.mark.parametrize("kind", ["starts", "empty", "finishes", "pieces"])
+async def test_a_flood_without_sound_is_cut_off(bundle, monkeypatch, kind):
+    monkeypatch.setattr(expression, "AT_ONCE", 200)
+    async with (
+        serving(expression_app(bundle)) as url,
+        connect(f"{url.replace('http', 'ws')}v1/expressions") as socket,
+    ):
+        with contextlib.suppress(ConnectionClosed):
+            for message in itertools.islice(sayings(kind), 240):
+                await socket.send(message)
+        with pytest.raises(ConnectionClosed) as closed:
+            async with asyncio.timeout(20):
+                while True:
+                    await socket.recv()
+    assert closed.value.rcvd.code == 1008
+    assert ("per second" in closed.value.rcvd.reason) == (kind == "pieces")
+
+
+@pytest.mark.parametrize("more", [PIECE, b"", "finish"])
+async def test_after_the_end_of_a_sound_comes_a_beginning(bundle, more):
+    async with (
+        serving(expression_app(bundle)) as url,
+        connect(f"{url.replace('http', 'ws')}v1/expressions") as socket,
+    ):
+        for message in ("start", PIECE, "finish", more):
+            await socket.send(message)
+        with pytest.raises(ConnectionClosed) as closed:
+            for _ in range(4):
+                await socket.recv()
+    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1008, expression.UNSTARTED)
+
+
+def test_an_hour_of_honest_sentences_is_borne():
+    now = 0.0
+    pace = expression.Pace(lambda: now)
+    for number in range(600):
+        now += 6.0
+        sentence = ["start", *[PIECE] * 60, *["finish"] * (number % 3 > 0)]  # some are interrupted
+        assert not any(map(pace.fault, sentence))
+
+
+async def test_the_end_of_a_sentence_of_whole_rows_sends_nothing_empty(bundle, model, sha256):
+    async with serving(expression_app(bundle)) as url:
+        made, sent = mouth(url, model, sha256), []
+        made.ask = lambda _, message, first: sent.append(message) or np.zeros((0, 32), np.float32)
+        lips = made.lips()
+        lips.push(np.ones(960, np.float32))
+        assert lips.push(np.zeros(0, np.float32)).shape == (0, 32)
+        assert len(sent) == 1
 
 
 class Counted:

@@ -228,6 +228,24 @@ async def test_a_dropped_page_takes_its_place_in_the_queue_again(bundle):
                 await placed(last, 1)
 
 
+async def test_a_place_in_the_queue_is_not_taken_again_without_end(bundle):
+    async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
+        page, _ = await open_page(url, microphone=False)
+        async with wire(url) as first:
+            place = await told(first)
+            for _ in range(RETURNS_AT_ONCE):
+                async with wire(url, place.session) as again:
+                    assert (await told(again)).session == place.session
+                    again.transport.abort()
+            async with wire(url, place.session) as again:
+                await again.wait_closed()  # without a word that would end the wait
+                assert again.close_code == 1013
+            await asyncio.sleep(1 / RETURNS)
+            async with wire(url, place.session) as again:
+                assert (await told(again)).session == place.session and len(sessions.line) == 1
+        await page.close()
+
+
 async def test_the_queue_has_an_end(bundle):
     async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
         page, _ = await open_page(url, microphone=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pipecat.frames.frames import ErrorFrame, TTSAudioRawFrame
 
-from ico3d.chat.services.voice import espeak
+from ico3d.chat.services.voice import espeak, lasting
 from ico3d.chat.supervision.apologies import APOLOGIES, apology, espeak_voice
 from ico3d.chat.supervision.voice import EnduringVoice, silence
 from ico3d.chat.wire.protocol import SPEECH_RATE
@@ -91,6 +91,45 @@ async def test_half_a_sentence_is_not_said_twice():
     np.testing.assert_array_equal(pcm[: len(SAID)], SAID)
     np.testing.assert_array_equal(pcm[len(SAID) :][: len(SORRY)], SORRY)
     assert voice.asked == 1 and errors == ["the voice failed: it broke off"]
+
+
+class Endless(Voice):
+    """A voice that goes on and on, in pieces of a second."""
+
+    given = 0
+
+    async def run_tts(self, text, context_id):
+        self.asked += 1
+        while True:
+            self.given += 1
+            yield TTSAudioRawFrame(bytes(2 * SPEECH_RATE), SPEECH_RATE, 1, context_id=context_id)
+
+
+async def test_a_voice_without_end_is_ended_and_apologised_for():
+    voice, text = Endless(), "a" * 30
+    enduring = voice.enduring()
+    pcm, errors = await said(enduring, text)
+    assert len(pcm) == 60 * SPEECH_RATE + len(SORRY) and voice.given == 61
+    assert errors == ["the voice failed: its sound is much longer than the text."]
+    pcm, _ = await said(enduring, text)  # the rest of that answer is read
+    assert not pcm.any() and voice.asked == 1
+    pcm, _ = await said(enduring, "Yes.", context_id="b")
+    assert len(pcm) <= 20 * SPEECH_RATE + len(SORRY)
+
+
+async def test_an_answer_has_so_much_sound_and_the_next_one_as_much(monkeypatch):
+    monkeypatch.setattr(lasting, "MOST", 45.0)
+
+    async def slow(text, context_id):
+        asked.append(context_id)
+        yield TTSAudioRawFrame(bytes(30 * SPEECH_RATE), SPEECH_RATE, 1, context_id=context_id)
+
+    asked = []
+    voice = lasting.Lasting(slow)
+    for answer in ("a", "b"):
+        told = [[type(f) async for f in voice.run_tts("Hello.", answer)] for _ in range(5)]
+        assert told == [[TTSAudioRawFrame]] * 3 + [[ErrorFrame]] * 2
+    assert asked == ["a"] * 3 + ["b"] * 3  # 45 s are used up: nobody is asked any more
 
 
 async def test_sound_that_comes_by_another_way_is_no_silence():

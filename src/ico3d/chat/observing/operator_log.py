@@ -2,7 +2,8 @@
 
 Messages of ico3d's own code are shown in full, because that code quotes nobody (`failures.py`).
 Messages of other packages may contain a question, an answer or a whole request. Of these only the
-constant part is shown, as it stands in the source code of the logging call.
+constant part is shown, as it stands in the source code of the logging call, and numbers, which
+quote nobody either.
 """
 
 import ast
@@ -10,9 +11,10 @@ import functools
 import json
 import linecache
 import logging
+import re
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, TextIO
@@ -31,6 +33,7 @@ TOLD = (  # places where pipecat logs the errors of processors, of which `metric
 )
 QUIET = 60.0  # s for which a line that has just been written is not written again
 MOST = 200  # lines that are remembered for it
+PLACEHOLDER = re.compile(r"%(?:\((?P<name>[^)]*)\))?[-#0 +]*[\d*]*(?:\.[\d*]+)?[a-zA-Z%]")
 LOGGING_CALL_LINES = 12  # source lines that one call of a logger takes at most
 
 
@@ -103,9 +106,10 @@ class StandardHandler(logging.Handler):
         self._log = log
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Writes a record: in full if it is ico3d's, else its constant part."""
+        """Writes a record: in full if it is ico3d's, else its constant part and numbers."""
         own = record.name.startswith(OWN)
-        said = record.getMessage() if own else constant_part(record.pathname, record.lineno)
+        constant = "" if own else constant_part(record.pathname, record.lineno)
+        said = record.getMessage() if own else filled(constant, record.args)
         error = record.exc_info[1] if record.exc_info else None
         self._log.write(record.levelname, _line(record.name, said, error))
 
@@ -143,6 +147,32 @@ def constant_part(path: str, line: int) -> str:
         if isinstance(node, ast.Call) and node.args:
             return _constant(node.args[0])
     return ""
+
+
+def filled(said: str, values: object) -> str:
+    """A message of `logging` with its numbers filled in, and … for all other values.
+
+    Args:
+        said: The message with placeholders such as `%s`.
+        values: A record's `args`: a tuple, a mapping, or nothing, which leaves the message as it
+            is.
+    """
+    if not values:
+        return said
+    named = values if isinstance(values, Mapping) else {}
+    rest = iter(values if isinstance(values, tuple) else ())
+
+    def one(place: re.Match[str]) -> str:
+        if place[0].endswith("%"):
+            return "%"
+        for _ in range(place[0].count("*")):  # widths that are values themselves
+            next(rest, None)
+        value = next(rest, None) if place["name"] is None else named.get(place["name"])
+        if not isinstance(value, int | float):
+            return "…"
+        return f"{value:g}" if isinstance(value, float) else str(value)
+
+    return PLACEHOLDER.sub(one, said)
 
 
 @functools.cache

@@ -7,6 +7,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pipecat.processors.frame_processor import FrameProcessor
+from starlette.exceptions import HTTPException
 
 from ico3d.chat.remote import expression, language, recognition, voice
 from ico3d.chat.remote.door import Door, error_response
@@ -77,6 +78,12 @@ def _bare_app(kind: str, name: str) -> FastAPI:
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         return error_response(400, f"{'.'.join(map(str, first['loc']))}: {first['msg']}.")
+
+    @app.exception_handler(HTTPException)
+    async def refused(_: Request, error: HTTPException) -> JSONResponse:
+        answer = error_response(error.status_code, f"{error.detail.rstrip('.')}.")
+        answer.headers.update(error.headers or {})
+        return answer
 
     @app.exception_handler(Ico3dError)
     async def failed(_: Request, error: Ico3dError) -> JSONResponse:

@@ -14,9 +14,11 @@ from pipecat.frames.frames import (
     LLMTextFrame,
     TTSAudioRawFrame,
 )
+from pipecat.services.tts_service import TTSService
 from pydantic import BaseModel, Field
 
 from ico3d.chat.remote.headless import Spares, run
+from ico3d.chat.services.voice.lasting import bound_sound
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import ServiceError
 
@@ -61,7 +63,7 @@ async def spoken(text: str, spares: Spares, seconds: float) -> AsyncGenerator[by
     """Yields the sound of a text as PCM16 at 24 kHz, sentence by sentence.
 
     Raises:
-        ServiceError: If the voice fails or produces no sound.
+        ServiceError: If the voice fails, or produces no sound or far too much.
         TimeoutError: If the time limit is exceeded.
     """
     frames: list[Frame] = [
@@ -69,8 +71,10 @@ async def spoken(text: str, spares: Spares, seconds: float) -> AsyncGenerator[by
         LLMTextFrame(text),
         LLMFullResponseEndFrame(),
     ]
-    silent = True
-    async with contextlib.aclosing(run(await spares.take(), frames, seconds)) as made:
+    silent, voice = True, await spares.take()
+    if isinstance(voice, TTSService):
+        bound_sound(voice)
+    async with contextlib.aclosing(run(voice, frames, seconds)) as made:
         async for frame in made:
             if isinstance(frame, TTSAudioRawFrame) and frame.audio:
                 silent = False

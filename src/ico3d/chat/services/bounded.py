@@ -33,14 +33,18 @@ def is_events(response: httpx2.Response) -> bool:
     return response.headers.get("Content-Type", "").startswith(EVENTS)
 
 
-async def bound(response: httpx2.Response) -> None:
+async def bound(response: httpx2.Response, most: int | None = None) -> None:
     """Has no more of an answer read than is allowed.
+
+    Args:
+        response: The answer.
+        most: Bytes that it may have; by default `MOST_BYTES`.
 
     Raises:
         ReadError: If the answer is compressed; while it is read, if it is too large.
     """
     await refuse_compressed(response)
-    response.stream = _Bounded(response.stream, is_events(response))
+    response.stream = _Bounded(response.stream, is_events(response), most or MOST_BYTES)
 
 
 class Wrapped(httpx2.AsyncByteStream):
@@ -57,11 +61,13 @@ class Wrapped(httpx2.AsyncByteStream):
 
 
 class _Bounded(Wrapped):
-    """The bytes of an answer, up to `MOST_BYTES`; of its lines, up to `MOST_OF_LINE`."""
+    """The bytes of an answer, up to `most`; of its lines, up to `MOST_OF_LINE`."""
 
-    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, lines: bool):
+    def __init__(
+        self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, lines: bool, most: int
+    ):
         super().__init__(stream)
-        self._lines = lines
+        self._lines, self._most = lines, most
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
         size = line = 0
@@ -69,6 +75,6 @@ class _Bounded(Wrapped):
             size += len(piece)
             end = piece.rfind(b"\n")
             line = line + len(piece) if end < 0 else len(piece) - end - 1
-            if size > MOST_BYTES or (self._lines and line > MOST_OF_LINE):
+            if size > self._most or (self._lines and line > MOST_OF_LINE):
                 raise httpx2.ReadError("its answer is too large")
             yield piece

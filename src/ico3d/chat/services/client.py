@@ -4,6 +4,7 @@ Importing this module is slow.
 """
 
 import os
+from functools import partial
 from typing import Any
 
 from openai import DefaultAsyncHttpxClient
@@ -17,7 +18,9 @@ CUSTOM_HEADERS = "OPENAI_CUSTOM_HEADERS"
 """Environment variable with further such headers, one `Name: value` per line."""
 
 
-def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict[str, Any]:
+def client_options(
+    url: str, key_variable: str, where: str, most: int | None = None, **http: Any
+) -> dict[str, Any]:
     """Options of the SDK's client for one server.
 
     Redirects are not followed, so that neither key nor words reach another server. Servers on this
@@ -27,6 +30,7 @@ def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict
         url: Address of the server; empty for OpenAI's.
         key_variable: Environment variable with the server's key, or empty.
         where: Place of the setting, for errors.
+        most: Bytes that an answer may have; by default those of `bounded`.
         http: Options of the HTTP client.
 
     Raises:
@@ -34,7 +38,7 @@ def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict
     """
     key = key_for(url, key_variable, where) or NONE
     own = [] if is_openai(url) else [_without_openais(key)]
-    hooks = {"request": [ask_plain, *own], "response": [bound]}
+    hooks = {"request": [ask_plain, *own], "response": [partial(bound, most=most)]}
     secure = not url.startswith("http:")  # else certificates would be read for nothing
     client = DefaultAsyncHttpxClient(
         follow_redirects=False,

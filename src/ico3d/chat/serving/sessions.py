@@ -28,7 +28,7 @@ class HastyError(Exception):
 
 
 class RestlessError(Exception):
-    """A page resumes its session more often than broken lines explain."""
+    """A page comes back more often than broken lines explain."""
 
 
 class Session:
@@ -120,13 +120,17 @@ class Sessions:
             FullError: If the queue is full; sessions whose page is away count as taken places.
             HastyError: If the machine has begun too many conversations in a short time.
             ClosedError: If the server is about to end.
-            RestlessError: If the page has resumed its session too often in a short time.
+            RestlessError: If the page has come back to its session, or to its place in the queue,
+                too often in a short time.
         """
         if self._resumable(hello):
             if not self._open[hello.session or ""].limits.come_back():
                 raise RestlessError
             return None
-        if not self.line.knows(hello.session) and not self._starts.take(machine):
+        if self.line.knows(hello.session):
+            if not self.line.may_return(hello.session):
+                raise RestlessError
+        elif not self._starts.take(machine):
             raise HastyError
         return self.line.join(hello.session, machine)
 

@@ -5,6 +5,8 @@ import secrets
 from collections import deque
 from collections.abc import Callable, Collection
 
+from ico3d.chat.serving.limits import RETURNS, RETURNS_AT_ONCE
+from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import RESUME_SECONDS
 
 MOST_WAITING = 50  # visitors; each holds an open connection
@@ -30,10 +32,13 @@ class Ticket:
         turned_away: Whether there will be no place, because the server is about to end.
         changed: Set when the queue has moved.
         machine: Machine of the visitor; empty if unknown.
+        returns: How often the page may come back to its place.
     """
 
-    def __init__(self, id: str, machine: str = ""):
-        """Waits with its page present."""
+    def __init__(self, id: str, machine: str = "", returns: Bucket | None = None):
+        """Waits with its page present; `returns` is that of the ticket of before, if any."""
+        loop = asyncio.get_running_loop()
+        self.returns = returns or Bucket(RETURNS, RETURNS_AT_ONCE, loop.time)
         self.id, self.machine = id, machine
         self.admitted = self.replaced = self.turned_away = False
         self.changed = asyncio.Event()
@@ -89,7 +94,10 @@ class WaitingLine:
         before = self._waiting.get(id or "")
         if before is None and self._is_full(machine) and not self._admits(machine):
             raise FullError
-        ticket = Ticket(before.id if before else secrets.token_urlsafe(16), machine)
+        if before is None:
+            ticket = Ticket(secrets.token_urlsafe(16), machine)
+        else:
+            ticket = Ticket(before.id, machine, before.returns)
         self._waiting[ticket.id] = ticket  # an id that is known keeps its position
         if before is not None:
             self._cancel_expiry(before)
@@ -101,6 +109,10 @@ class WaitingLine:
     def knows(self, id: str | None) -> bool:
         """Whether the place with this id is taken by somebody who waits."""
         return id in self._waiting
+
+    def may_return(self, id: str | None) -> bool:
+        """Counts a return to a place that `knows` knows; False if there were too many at once."""
+        return self._waiting[id or ""].returns.take(1)
 
     def leave(self, ticket: Ticket, for_good: bool = True) -> None:
         """Gives a place up, or keeps it a while for a page that may come back.

@@ -1,7 +1,7 @@
 """Makes sure that no sentence stays without sound when a voice fails.
 
-A voice gets a time limit and a second attempt. After that, another voice apologises, and the answer
-is shown as captions only.
+A voice gets a time limit, as much sound as its text may need, and a second attempt. After that,
+another voice apologises, and the answer is shown as captions only.
 """
 
 import asyncio
@@ -16,6 +16,7 @@ from pipecat.utils.errors import ErrorCategory
 from ico3d.chat.observing.failures import ReportedError
 from ico3d.chat.pipecat_internals import replace_run_tts
 from ico3d.chat.services.voice import espeak
+from ico3d.chat.services.voice.lasting import Lasting, Speak
 from ico3d.chat.supervision.apologies import apology, espeak_voice
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import Ico3dError, ServiceError
@@ -24,8 +25,6 @@ TRIES = 2
 RATE = espeak.Settings().rate
 READING = 15.0  # letters per second that a reader takes in
 SHORTEST, LONGEST = 1.0, 12.0  # s that a caption without a voice stays
-
-Speak = Callable[[str, str], AsyncGenerator[Frame | None, None]]
 
 
 class LateError(ServiceError):
@@ -47,7 +46,7 @@ class EnduringVoice:
             language: Language code of the apology.
             complain: Receives the reason if not even the apology can be spoken.
         """
-        self._speak, self._patience = speak, patience
+        self._speak, self._patience = Lasting(speak).run_tts, patience
         self._language, self._complain = language, complain
         self._lost = ""  # the answer whose apology has been said
 

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from ico3d.chat.services import choose
-from ico3d.chat.services.recognition import browser
+from ico3d.chat.services.recognition import browser, room
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.protocol import (
     MAX_QUESTION,
@@ -125,19 +125,36 @@ def finals(count, letters, first=0):
 
 @pytest.mark.parametrize(
     "results",
-    [finals(browser.MOST_RESULTS + 30, 5), finals(40, 4000), [Heard(0, "word " * 800, True)]],
+    [finals(room.MOST_RESULTS + 30, 5), finals(40, 4000), [Heard(0, "word " * 800, True)]],
     ids=["many", "long", "one"],
 )
 def test_a_turn_holds_no_more_than_a_typed_question(results):
-    room = browser.Room()
-    taken = [room.take(heard.text) for heard in results]
+    left = room.Room()
+    taken = [left.take(heard.text) for heard in results]
     kept = [words for words in taken if words]
-    assert len(kept) <= browser.MOST_RESULTS and len(" ".join(kept)) <= MAX_QUESTION
+    assert len(kept) <= room.MOST_RESULTS and len(" ".join(kept)) <= MAX_QUESTION
     whole = [heard.text for heard in results[: len(kept)]]
     assert kept == [text[: len(words)] for text, words in zip(whole, kept, strict=True)]
-    assert room.fit("more") == "" or len(" ".join(kept)) < MAX_QUESTION - 1
-    room.clear()
-    assert room.take("what is") == "what is"
+    assert left.fit("more") == "" or len(" ".join(kept)) < MAX_QUESTION - 1
+    left.clear()
+    assert left.take("what is") == "what is"
+
+
+async def test_of_a_flood_of_partial_words_the_newest_are_told(bundle):
+    async with serving(bundle, ALONE, adapt=silent) as (url, _):
+        page, _ = await open_page(url, microphone=False)
+        await page.send(Talk(True))
+        await page.wait(State, where=lambda m: m.state == "listening")
+        for number in range(90):
+            await page.send(Heard(0, f"what {number}", False))
+        await page.wait(Transcript, where=lambda m: m.text == "what 89")
+        partial = [m.text for m in page.messages(Transcript)]
+        assert partial[0] == "what 0" and len(partial) <= 20
+        await page.send(Heard(0, "what is your name", True))
+        await page.send(Talk(False))
+        await page.wait(Answer)
+        assert page.messages(Transcript)[-1].final
+        await page.close()
 
 
 async def test_words_of_a_held_button_end_like_typed_ones(bundle):

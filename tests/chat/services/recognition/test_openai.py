@@ -41,6 +41,8 @@ async def transcribing():
         file = await form["file"].read()
         if form["model"] == "halves":
             return Response('{"text": "a\\ud83d."}', media_type="application/json")
+        if form["model"].startswith("words"):
+            return {"text": "word " * (int(form["model"][5:]) // 5)}
         return {"text": "" if form["model"] == "deaf" else described(file, form, request)}
 
     listener = server.bind("127.0.0.1", 0)
@@ -81,6 +83,18 @@ async def test_halves_of_characters_go_no_further():
     async with transcribing() as (url, _):
         (frame,), errors = await listen(make(Settings(url, "halves"), NOBODY), noise())
         assert frame.text == "a\ufffd." and not errors
+
+
+async def test_a_transcript_is_no_longer_than_a_question():
+    async with transcribing() as (url, _):
+        (frame,), errors = await listen(make(Settings(url, "words60000"), NOBODY), noise())
+        assert frame.text == ("word " * 400).strip() and not errors
+
+
+async def test_a_long_answer_is_not_even_parsed():
+    async with transcribing() as (url, _):
+        (frame,), errors = await listen(make(Settings(url, "words70000"), NOBODY), noise())
+        assert frame.text == BLANK and len(errors) == 1 and "gave no transcript" in errors[0]
 
 
 @pytest.mark.parametrize(

@@ -28,38 +28,15 @@ from ico3d.chat.frames import message_in
 from ico3d.chat.pipecat_internals import is_user_speaking, raise_event
 from ico3d.chat.services.choosing import ChosenService, chosen
 from ico3d.chat.services.provider import Context, Table
+from ico3d.chat.services.recognition.room import Room
 from ico3d.chat.services.recognition.segments import blank
 from ico3d.chat.settings.conversation import BEST, Choice
-from ico3d.chat.wire.protocol import MAX_QUESTION, Deaf, Heard
+from ico3d.chat.wire.protocol import Deaf, Heard
 
 SETTLED = 0.5  # s without news in silence after which partial words are taken for final ones
 SLOWEST = 1.5  # s that a browser may take for its first words
 LATE = 3.0  # s after a voice in which its words may still come
-MOST_RESULTS = 200  # final ones of a turn: nobody says more in one breath
-
-
-class Room:
-    """What a turn may still hold: as many letters as a typed question, in so many results."""
-
-    def __init__(self):
-        """Starts with an empty turn."""
-        self.clear()
-
-    def clear(self) -> None:
-        """Begins a new turn."""
-        self._letters, self._results = MAX_QUESTION, MOST_RESULTS
-
-    def fit(self, words: str) -> str:
-        """The part of a result for which there is room."""
-        return words.strip()[: self._letters].strip() if self._results else ""
-
-    def take(self, words: str) -> str:
-        """As `fit`, for words that are final."""
-        words = self.fit(words)
-        if words:
-            self._letters = max(0, self._letters - len(words) - 1)  # and the space behind them
-            self._results -= 1
-        return words
+PACE = 0.1  # s between partial words that are passed on: faster than anybody reads
 
 
 @dataclass(frozen=True)
@@ -94,15 +71,19 @@ class BrowserRecognition(STTService):
         self._voice_until = -LATE  # the event loop's clock
         self._room, self._in_turn = Room(), False
         self._timer: asyncio.Task | None = None
+        self._telling: asyncio.Task | None = None  # of partial words, when it is time
+        self._told = -PACE  # when partial words were passed on
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
         """Yields nothing: this recogniser does not use sound."""
         yield None
 
     async def cleanup(self):
-        """Cancels the timer."""
+        """Cancels what waits."""
         await super().cleanup()
         await self._stop_timer()
+        if self._telling is not None:
+            await self.cancel_task(self._telling)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Handles the page's words and passes all other frames on."""
@@ -134,10 +115,26 @@ class BrowserRecognition(STTService):
             await self._take(heard)
             return
         self._partial = heard
-        if words := self._room.fit(heard.text):
-            await self.push_frame(InterimTranscriptionFrame(words, "", time_now_iso8601()))
+        if self._telling is None:
+            wait = self._told + PACE - self._now()
+            if wait > 0:
+                self._telling = self.create_task(self._tell_later(wait), "tell")
+            else:
+                await self._tell()
         if not is_user_speaking(self):
             await self._restart_timer()
+
+    async def _tell_later(self, wait: float) -> None:
+        await asyncio.sleep(wait)
+        self._telling = None
+        await self._tell()
+
+    async def _tell(self) -> None:
+        """Passes the newest partial words on, unless they are final by now."""
+        self._told = self._now()
+        words = self._room.fit(self._partial.text) if self._partial else ""
+        if words:
+            await self.push_frame(InterimTranscriptionFrame(words, "", time_now_iso8601()))
 
     async def _take(self, heard: Heard) -> None:
         self._taken, self._partial, self._understood = heard.result, None, True

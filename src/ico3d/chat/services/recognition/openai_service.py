@@ -15,6 +15,9 @@ from ico3d.chat.services.recognition.openai_settings import WHERE, Settings
 from ico3d.chat.services.recognition.segments import Segments
 from ico3d.chat.wire.characters import sendable
 
+MOST_BYTES = 64 << 10
+"""Of an answer: nobody says more in five minutes, and longer ones hold everybody up."""
+
 
 class Transcriptions(OpenAISTTService):
     """Requests transcripts with the options of ico3d's settings.
@@ -25,7 +28,7 @@ class Transcriptions(OpenAISTTService):
     def __init__(self, options: Settings, **rest):
         """Creates a client of the server in the settings."""
         super().__init__(
-            **client_options(options.url, options.key_variable, WHERE),
+            **client_options(options.url, options.key_variable, WHERE, MOST_BYTES),
             settings=OpenAISTTService.Settings(model=options.model),
             **rest,
         )

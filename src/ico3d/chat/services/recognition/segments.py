@@ -19,6 +19,7 @@ from pipecat.utils.errors import ErrorCategory
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.pipecat_internals import is_user_speaking, keep_segment, segment, transcribe_segment
+from ico3d.chat.wire.protocol import MAX_QUESTION
 from ico3d.errors import SettingsError
 
 BLANK = " "
@@ -129,9 +130,12 @@ class Segments(SegmentedSTTService):
             yield frame
 
     async def push_frame(self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM):
-        """Passes a frame on; a transcript is marked final only if no other is on its way."""
+        """Passes a frame on; a transcript is marked final only if no other is on its way.
+
+        Of a transcript that is longer than a question may be, the beginning is kept.
+        """
         if isinstance(frame, TranscriptionFrame):
-            frame.text = frame.text.strip() or BLANK
+            frame.text = frame.text.strip()[:MAX_QUESTION].strip() or BLANK
             frame.finalized = not is_user_speaking(self) and self._unanswered == 0
         await STTService.push_frame(self, frame, direction)  # the class between says final to all
 
