@@ -1,6 +1,8 @@
 """Pictures of anybody: of two kinds, of bounded size, by one function."""
 
+import io
 import json
+import os
 import re
 import struct
 import zlib
@@ -84,3 +86,46 @@ def test_pictures_are_opened_in_kinds_that_are_named():
     for file in Path(ico3d.__file__).parent.rglob("*.py"):
         calls = re.findall(r"\bImage\.open\((.*)", file.read_text("utf-8"))
         assert all("formats=" in call for call in calls), file
+
+
+def passes(times, **options):
+    """A JPEG picture, and the same one whose last pass comes again."""
+    written = io.BytesIO()
+    noise = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
+    Image.fromarray(noise).save(written, "JPEG", **options)
+    whole = written.getvalue()
+    last = whole[whole.rfind(b"\xff\xda") : -2]
+    return whole, whole[:-2] + last * times + whole[-2:]
+
+
+def test_a_picture_of_thousands_of_passes_is_not_opened(tmp_path):
+    whole, many = passes(1000, progressive=True)
+    (tmp_path / "many.jpg").write_bytes(many)
+    hidden = many[:2] + b"\xff\xe1\0\x06\xff\xd9\xff\xd9" + many[2:]  # an end in a remark
+    assert decoded(whole, "picture").shape == (48, 64, 3)
+    for source in (many, tmp_path / "many.jpg", hidden):
+        for read in (decoded, size_of, has_opacity, open_picture):
+            with pytest.raises(CaptureError, match="more passes than cameras make"):
+                read(source, "picture")
+
+
+def test_passes_that_are_not_decoded_do_not_count():
+    whole, many = passes(1000, quality=90)
+    assert size_of(many, "picture") == (64, 48)  # all colours are in the first pass
+    film = whole + b"\xff\xda\0\x08" * 1000  # such as phones put behind a picture
+    assert decoded(film, "picture").shape == (48, 64, 3)
+    progressive, _ = passes(0, progressive=True)
+    assert decoded(progressive + b"\xff\xda\0\x08" * 1000, "picture").shape == (48, 64, 3)
+
+
+def test_segments_have_an_end():
+    whole, _ = passes(0, progressive=True)
+    many = whole[:2] + b"\xff\xe1\0\x02" * 20_000 + whole[2:]
+    with pytest.raises(CaptureError, match="more passes than cameras make"):
+        size_of(many, "picture")
+
+
+def test_nothing_waits_for_a_pipe(tmp_path):
+    os.mkfifo(tmp_path / "a.jpg")
+    with pytest.raises(CaptureError, match="cannot be decoded"):
+        size_of(tmp_path / "a.jpg", "picture")

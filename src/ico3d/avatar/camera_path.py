@@ -12,6 +12,7 @@ from ico3d.body.training.novel_views import se3_exp, se3_log
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
+from ico3d.common.files import read_small
 from ico3d.errors import CaptureError, SettingsError
 
 AIR = 1.15
@@ -135,7 +136,7 @@ def read_key_cameras(file: Path, width: int, height: int) -> list[Camera]:
         SettingsError: If the file cannot be read, or a camera in it makes no sense.
     """
     try:
-        entries = json.loads(file.read_text())["cameras"]
+        entries = json.loads(read_small(file))["cameras"]
         cameras = [_key_camera(entry, width, height) for entry in entries]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SettingsError(

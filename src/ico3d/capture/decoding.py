@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from ico3d.capture.vetting.scans import has_many_scans
 from ico3d.errors import CaptureError
 
 FORMATS = ("JPEG", "PNG")
@@ -75,9 +76,12 @@ def open_picture(
         The picture, to be closed by the caller.
 
     Raises:
-        CaptureError: If it is larger than is taken.
-        OSError: If it is missing, damaged or of another kind; others of `DAMAGED` too.
+        CaptureError: If it is larger than is taken, or has more passes (`has_many_scans`).
+        OSError: If it is missing, damaged, no regular file or of another kind; others of `DAMAGED`
+            too.
     """
+    if isinstance(source, Path) and source.exists() and not source.is_file():
+        raise OSError(f"{source} is no regular file")  # a pipe is waited for
     stream = io.BytesIO(source) if isinstance(source, bytes) else source
     try:
         picture = Image.open(stream, formats=formats)
@@ -85,10 +89,18 @@ def open_picture(
         raise CaptureError(f"{what}: the picture is larger than is taken.") from error
     try:
         check_size(what, *picture.size)
+        _check_scans(source, what)
     except CaptureError:
         picture.close()
         raise
     return picture
+
+
+def _check_scans(source: Path | bytes, what: str) -> None:
+    """Refuses a JPEG picture of many passes, each of which takes the time of a whole picture."""
+    with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
+        if has_many_scans(file):
+            raise CaptureError(f"{what}: the picture has more passes than cameras make.")
 
 
 def check_size(what: str, width: int, height: int) -> None:

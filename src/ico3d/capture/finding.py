@@ -22,7 +22,11 @@ class Finding:
 
 
 def missing_and_damaged(
-    what: str, total: int, missing: list[tuple[str, int]], damaged: list[tuple[str, int]]
+    what: str,
+    total: int,
+    missing: list[tuple[str, int]],
+    damaged: list[tuple[str, int]],
+    further: int = 0,
 ) -> Finding:
     """A finding about files of which there is one for each camera and frame.
 
@@ -31,12 +35,15 @@ def missing_and_damaged(
         total: Number of files that there should be.
         missing: Pairs (camera, frame) without a file, which is allowed, as captures may lack views.
         damaged: Pairs (camera, frame) whose file cannot be a picture.
+        further: Number of missing ones that are not in `missing`.
     """
     parts = [
         f"{word}: camera {faults[0][0]}, frame {faults[0][1]}"
-        + (f" (and {len(faults) - 1} more)" if faults[1:] else "")
-        for word, faults in (("damaged", damaged), ("missing", missing))
+        + (f" (and {more} more)" if (more := len(faults) - 1 + beside) else "")
+        for word, faults, beside in (("damaged", damaged, 0), ("missing", missing, further))
         if faults
     ]
-    level: Level = "error" if damaged or len(missing) == total else "warn" if missing else "ok"
+    level: Level = (
+        "error" if damaged or len(missing) + further == total else "warn" if missing else "ok"
+    )
     return Finding(what, level, "; ".join(parts) or f"all {total} are there")

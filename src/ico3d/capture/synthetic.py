@@ -14,6 +14,7 @@ from ico3d.capture.decoding import DAMAGED, open_picture, unit
 from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
+from ico3d.common.files import MOST_BYTES, read_small
 from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
@@ -159,7 +160,7 @@ class SyntheticCapture(RecordedCapture):
     def _read_frames(self) -> dict[str, np.ndarray]:
         file = self.path / "frames.safetensors"
         try:
-            arrays = load(file.read_bytes())
+            arrays = load(read_small(file, most=MOST_BYTES))
         except (OSError, SafetensorError) as error:
             raise CaptureError(f"{file} is missing or damaged: record again.") from error
         frames, shapes = self.num_frames, len(self._about["blendshape_names"])
@@ -193,7 +194,7 @@ def _check_array(
 
 def _read_json(file: Path) -> dict:
     try:
-        about = json.loads(file.read_text(encoding="utf-8"))
+        about = json.loads(read_small(file).decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise CaptureError(f"{file} is missing or damaged: record again.") from error
     if not isinstance(about, dict) or about.get("format") != FORMAT:

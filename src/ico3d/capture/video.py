@@ -11,15 +11,18 @@ from ico3d.capture import decoding
 from ico3d.capture.capture import Sound
 from ico3d.capture.decoding import check_size
 from ico3d.capture.sound import check_claim, joined
+from ico3d.capture.vetting.promises import check_promises
 from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
 SOUND_RATE = 16_000
+BOXES = "mov,mp4"
+"""FFmpeg's names for MP4 and QuickTime, which are opened only where `check_promises` knew them."""
 FORMATS = (
-    "mov,mp4,matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,ivf,flv,asf,ogg,mxf,nut,gif,"
-    "dv,rm,y4m,yuv4mpegpipe"
+    "matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,ivf,flv,asf,ogg,mxf,nut,gif,dv,rm,y4m,"
+    "yuv4mpegpipe"
 )
-"""Kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
+"""Other kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
 
 
 @dataclass
@@ -125,16 +128,19 @@ def _is_near(wanted: float, taken: float, fps: float) -> bool:
 def opened(path: Path) -> Any:
     """A PyAV container of a file, which cannot make FFmpeg open another file or an address.
 
-    Its decoders refuse larger pictures than the file states, which would fill the memory.
+    Its decoders refuse larger pictures than the file states, which would fill the memory. Every
+    video is opened here: what its tables promise is looked at first.
 
     Raises:
-        CaptureError: If the file states larger pictures than are taken (`decoding.check_size`).
+        CaptureError: If the file states larger pictures than are taken (`decoding.check_size`), or
+            promises more than it can hold (`check_promises`).
         FFmpegError: If it is no video, or is a play list.
         OSError: If it cannot be read.
     """
     import av
 
-    bounds = {"format_whitelist": FORMATS, "protocol_whitelist": "file"}
+    formats = BOXES if check_promises(path) else FORMATS
+    bounds = {"format_whitelist": formats, "protocol_whitelist": "file"}
     container = av.open(str(path), metadata_errors="replace", container_options=bounds)
     try:
         for stream in container.streams.video:

@@ -19,6 +19,9 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 MOST_NOTES = 64 << 20
 """Bytes of a file that `read_small` reads."""
 
+MOST_BYTES = 4 << 30
+"""Bytes of a large file, such as a table of points, that `read_small` reads where it is told to."""
+
 LONGEST = 3_500
 """Characters of a path below which `walk` looks: systems end at 4,096 bytes, names of files too."""
 
@@ -95,7 +98,7 @@ def read_object(file: Path) -> dict[str, Any]:
     return cast(dict[str, Any], content) if isinstance(content, dict) else {}
 
 
-def read_small(file: Path, links: bool = True) -> bytes:
+def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes:
     """The content of a small file, which may be anybody's.
 
     Nothing is read that has no end, such as what a link to a device leads to, and nobody waits for
@@ -104,17 +107,19 @@ def read_small(file: Path, links: bool = True) -> bytes:
     Args:
         file: The file.
         links: Whether it may be a link to a file.
+        most: Bytes that are read; None for `MOST_NOTES`.
 
     Raises:
-        OSError: If it is not there, no regular file, or larger than `MOST_NOTES`.
+        OSError: If it is not there, no regular file, or larger than `most`.
     """
+    most = MOST_NOTES if most is None else most
     how = 0 if links else getattr(os, "O_NOFOLLOW", 0)
     how |= os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(os.open(file, how), "rb") as opened:
         about = os.fstat(opened.fileno())
-        if not stat.S_ISREG(about.st_mode) or about.st_size > MOST_NOTES:
+        if not stat.S_ISREG(about.st_mode) or about.st_size > most:
             raise OSError(errno.EINVAL, "it is no small file", str(file))
-        return opened.read(MOST_NOTES)
+        return opened.read(most)
 
 
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from ico3d.avatar.embodying.look import UNCHANGED
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.voice import VOICE as TONE
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import plain
 from ico3d.creating.looking.advice import Advice
@@ -85,7 +85,7 @@ class Workplace:
     def read(self, name: str) -> dict | None:
         """A note that `write` left, or None."""
         try:
-            return json.loads(self.file(name).read_text("utf-8"))
+            return json.loads(read_small(self.file(name)).decode("utf-8"))
         except (OSError, ValueError):
             return None
 

@@ -3,12 +3,12 @@
 Recordings do not contain these positions; they are recomputed from the recording's settings.
 """
 
-import json
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
+from ico3d.common.files import read_object
 from ico3d.errors import CaptureError
 from ico3d.studio.acting.embody import embodied
 from ico3d.studio.acting.performance import perform
@@ -44,7 +44,7 @@ def true_joints(folder: Path, subject: Path) -> TrueJoints:
         CaptureError: If the folder holds no synthetic recording, or not of a whole person.
     """
     file = folder / "capture.json"
-    settings = json.loads(file.read_text()).get("settings") if file.exists() else None
+    settings = read_object(file).get("settings")
     if settings is None:
         raise CaptureError(f"{folder} is no recording that ico3d capture synthetic made.")
     known = [field.name for field in fields(Recording) if field.name in settings]

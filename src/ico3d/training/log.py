@@ -50,7 +50,7 @@ def _entries_before(path: Path, step: int) -> list[str]:
 
     What a disk has damaged is dropped: no training depends on it.
     """
-    if not path.exists():
+    if not path.is_file():
         return []
     lines = path.read_text("utf-8", errors="replace").splitlines(keepends=True)
     return [line for line in lines if line.endswith("\n") and _is_before(line, step)]

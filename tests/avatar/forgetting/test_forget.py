@@ -165,6 +165,24 @@ def test_what_create_left_on_the_way_is_found_by_name_and_with_the_bundle(projec
         assert f"- {places[2]}, a workplace that does not say whom it shows: look at it" in said
 
 
+def test_what_a_killed_recording_left_is_found_by_name(project, capsys):
+    ada, bob = project / "captures/.me.0123abcd", project / "captures/.bob.0123abcd"
+    nameless, complete = project / ".old.0123abcd", project / ".late.0123abcd"
+    for folder, name in ((ada, "Ada"), (bob, "Bob")):
+        folder.mkdir()
+        (folder / "0.jpg").touch()
+        (folder / "unfinished.json").write_text(json.dumps({"likeness": name, "sources": ["a"]}))
+    nameless.mkdir()
+    recording(complete, likeness="Ada")
+    recording(project / ".hidden", likeness="Ada")
+    assert main(["forget", "Ada", "--yes"]) == 0
+    left = [one.exists() for one in (ada, bob, nameless, complete, project / ".hidden")]
+    assert left == [False, True, True, False, True]
+    said = capsys.readouterr().out
+    assert f"{ada}: an unfinished recording of Ada" in said
+    assert f"- {nameless}, an unfinished recording that does not say whom it shows" in said
+
+
 def test_links_go_and_what_they_lead_to_is_named(project, tmp_path, capsys):
     elsewhere = recording(tmp_path / "archive", likeness="Ada")
     (project / "captures/linked").symlink_to(elsewhere)

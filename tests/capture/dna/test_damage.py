@@ -252,3 +252,31 @@ def test_files_cut_anywhere_are_one_sentence(sound, tmp_path_factory, data, whic
     whole = file.read_bytes()
     file.write_bytes(whole[: data.draw(st.integers(0, len(whole) - 1))])
     fails(lambda: read_everything(folder / sound.name), file.name)
+
+
+def test_links_by_name_lead_nowhere_but_into_the_file(tmp_path):
+    with h5py.File(tmp_path / "secret.h5", "w") as file:
+        file["inner/n"] = np.array([42.0])
+        file["n"] = np.array([42.0])
+    with h5py.File(tmp_path / "a.smc", "w") as file:
+        file["inner/n"] = np.array([7.0])
+        file["out"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/")
+        for name, path in (
+            ("absolute", "/inner/n"),
+            ("relative", "./inner//n"),
+            ("twice", "relative"),
+            ("inner/beside", "n"),
+            ("through", "/out/inner"),
+            ("far", "/out/n"),
+            ("beyond", "through/n"),
+            ("circle", "/circle"),
+            ("nothing", "/inner/none"),
+        ):
+            file[name] = h5py.SoftLink(path)
+    opened = SmcFile(tmp_path / "a.smc")
+    for name in ("inner/n", "absolute", "relative", "twice", "inner/beside"):
+        np.testing.assert_array_equal(opened.numbers(name, (1,)), [7.0])
+    for name in ("out", "out/n", "through", "through/n", "far", "beyond", "circle"):
+        for read in (opened.keys, opened.holds, opened.shape, opened.encoded):
+            fails(lambda name=name, read=read: read(name), name, "damaged")
+    assert opened.numbers("nothing", (1,)) is None

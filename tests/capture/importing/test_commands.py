@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections import Counter
+from time import process_time
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from ico3d.capture.formats import open_capture
-from ico3d.capture.importing.recording import import_recording
+from ico3d.capture.importing.recording import _free, import_recording
 from ico3d.capture.importing.settings import ImportSettings
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.cli import main
@@ -257,6 +259,35 @@ def test_names_that_would_collide_or_escape(tmp_path):
     foreign_models.write_transforms(tmp_path, foreign_models.frames(foreign_models.poses(4), names))
     capture = imported(tmp_path, tmp_path / "out")
     assert [c.name for c in capture.cameras] == ["001", "001_2", "camera-", "___"]
+
+
+def test_thousands_of_equal_names_are_told_apart_at_once():
+    taken, begun = Counter(), process_time()
+    names = [_free(name, taken) for name in ("a", "A_2", "a", *["a"] * 20_000)]
+    assert names[:4] == ["a", "A_2", "a_3", "a_4"]
+    assert len({name.lower() for name in names}) == len(names)
+    assert process_time() - begun < 2
+
+
+def test_a_picture_that_is_listed_twice_is_not_copied_for_each(tmp_path):
+    foreign_models.write_pictures(tmp_path, ["a.png", "b.png"])
+    names = ["a.png", "b.png", "./a.png"]
+    foreign_models.write_transforms(tmp_path, foreign_models.frames(foreign_models.poses(3), names))
+    fails(lambda: imported(tmp_path, tmp_path / "out"), "a.png is listed twice")
+
+
+def test_a_mask_of_many_pictures_is_copied_once(tmp_path):
+    names = ["a.png", "b.png", "c.png"]
+    foreign_models.write_pictures(tmp_path, names)
+    Image.new("L", (40, 32), 255).save(tmp_path / "mask.png")
+    entries = foreign_models.frames(foreign_models.poses(3), names)
+    for entry in entries:
+        entry["mask_path"] = "mask.png"
+    foreign_models.write_transforms(tmp_path, entries)
+    capture = imported(tmp_path, tmp_path / "out")
+    assert [capture.mask(camera, 0).mean() for camera in range(3)] == [1, 1, 1]
+    masks = (tmp_path / "out" / "masks").glob("*/*.png")
+    assert len({mask.stat().st_ino for mask in masks}) == 1
 
 
 def test_the_command(tmp_path, capsys):

@@ -1,6 +1,7 @@
 """Multiview folders: what lies in them comes back, and what does not is named."""
 
 import json
+import shutil
 
 import cv2
 import numpy as np
@@ -125,6 +126,29 @@ def test_missing_and_damaged_views_are_named(folder):
     (finding,) = (f for f in examine(capture) if f.what == "views")
     assert finding.level == "error"
     assert finding.text == "damaged: camera cam02, frame 2; missing: camera cam03, frame 1"
+
+
+def test_millions_of_claimed_frames_take_no_time(folder, monkeypatch):
+    about = json.loads((folder / "cameras.json").read_text())
+    (folder / "cameras.json").write_text(json.dumps(about | {"num_frames": 10_000_000}))
+    shutil.copytree(folder / "images", folder / "masks")
+    (folder / "images/cam03/000001.png").unlink()
+    (folder / "masks/cam03/000002.png").unlink()
+    capture, asked = open_capture(folder), []
+    file = capture.files.file
+    monkeypatch.setattr(capture.files, "file", lambda *a: asked.append(a) or file(*a))
+    found = {f.what: (f.level, f.text) for f in capture.inspect()}
+    more = 5 * 10_000_000 - 14 - 1
+    assert found["views"] == ("warn", f"missing: camera cam00, frame 3 (and {more} more)")
+    assert found["mask files"][1].startswith("missing: camera cam03, frame 2")
+    assert len(asked) < 200
+
+
+def test_missing_frames_of_one_camera_are_counted(folder):
+    for number in (0, 2):
+        (folder / f"images/cam03/00000{number}.png").unlink()
+    (finding,) = (f for f in examine(open_capture(folder)) if f.what == "views")
+    assert finding.text == "missing: camera cam03, frame 0 (and 1 more)"
 
 
 def test_cut_pictures_are_damaged_not_half_grey(folder):

@@ -174,6 +174,16 @@ def test_a_file_that_is_no_video_is_one_sentence(eye, tmp_path, id):
     assert refused.value.code == "no-video"
 
 
+def test_tables_that_promise_too_much_are_no_large_picture(eye, tmp_path):
+    file = part_file(tmp_path / "x.mp4")
+    data = file.read_bytes()
+    at = data.index(b"stsz") + 12
+    file.write_bytes(data[:at] + b"\3\0\0\0" + data[at + 4 :])
+    with pytest.raises(Refused) as refused:
+        eye.report(file, "upload")
+    assert refused.value.code == "no-video"
+
+
 def test_turns_by_name():
     assert [turn_of(text) for text in ("left", "down", "text-1", "")] == [
         "left",

@@ -8,6 +8,7 @@ from ico3d.avatar.models import KINDS
 from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST, Manifest
+from ico3d.capture.writing.new_folder import UNFINISHED, is_unfinished
 from ico3d.common.files import read_object, walk
 from ico3d.common.people.stated import BETWEEN, NOBODY, alike, is_stated
 from ico3d.errors import Ico3dError
@@ -19,6 +20,7 @@ MADE_OF = ("capture", "head", "continued")
 VOICE = "cloned_voice.json"
 """File beside a voice that `ico3d create` has cloned."""
 RECORDINGS = {
+    UNFINISHED: UNFINISHED,
     "transforms_train.json": "ico3d.json",
     "cameras.json": "cameras.json",
     "capture.json": "capture.json",
@@ -65,7 +67,9 @@ class Holding:
 
 
 def find_holdings(project: Path) -> list[Holding]:
-    """Finds all that shows people in a folder and below it, but for hidden folders.
+    """Finds all that shows people in a folder and below it.
+
+    Of hidden folders it looks only into unfinished recordings.
 
     Args:
         project: The folder, absolute. Linked folders in it are looked at, but not below.
@@ -75,7 +79,7 @@ def find_holdings(project: Path) -> list[Holding]:
 
 def _walk(project: Path) -> Iterator[Holding]:
     for folder, folders, files in walk(project):
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        folders[:] = sorted(n for n in folders if not n.startswith(".") or is_unfinished(n))
         linked = (folder / name for name in folders if (folder / name).is_symlink())
         for candidate in (folder, *linked):
             if candidate != project and (found := _folder(candidate)) is not None:
@@ -96,7 +100,8 @@ def _folder(folder: Path) -> Holding | None:
         return found
     run, models = read_object(folder / RUN), [read_object(folder / name) for name in MODELS]
     if not any(models) and "capture" not in run:
-        return None
+        hidden = is_unfinished(folder.name)
+        return Holding(folder, "an unfinished recording", ()) if hidden else None
     made_of = [Path(run[name]) for name in MADE_OF if isinstance(run.get(name), str)]
     parts = [part for model in models if isinstance(part := model.get("summary"), dict)]
     stated = [part.get(key, {}) for part in parts for key in ("capture", "head", "body")]
@@ -121,6 +126,8 @@ def _recording(folder: Path, file: str) -> Holding:
     sources = tuple(map(str, sources)) if isinstance(sources, list) else ()
     likeness = NOBODY if file == "capture.json" else str(about.get("likeness", ""))
     what = "a cloned voice" if file == VOICE else "a recording"
+    if file == UNFINISHED or is_unfinished(folder.name):
+        what = "an unfinished recording"
     return Holding(folder, what, _named(likeness), (), sources)
 
 

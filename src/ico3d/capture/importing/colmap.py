@@ -8,6 +8,7 @@ import numpy as np
 
 from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside
 from ico3d.capture.lens import Lens
+from ico3d.common.files import MOST_BYTES, read_small
 from ico3d.errors import CaptureError
 
 MODELS = {
@@ -110,7 +111,7 @@ def _camera_to_world(numbers: np.ndarray, what: str) -> np.ndarray:
 
 def _lines(file: Path) -> Iterator[str]:
     """Lines of a text file without comments; empty ones count."""
-    for line in file.read_text(encoding="utf-8").splitlines():
+    for line in read_small(file, most=MOST_BYTES).decode("utf-8").splitlines():
         if not line.startswith("#"):
             yield line
 
@@ -145,7 +146,7 @@ class _Bytes:
     """A binary file read from front to back."""
 
     def __init__(self, file: Path):
-        self._data, self._at = file.read_bytes(), 0
+        self._data, self._at = read_small(file, most=MOST_BYTES), 0
 
     def take(self, layout: str) -> tuple:
         """The next numbers, little-endian, by a layout of the module struct."""

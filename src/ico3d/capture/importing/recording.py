@@ -1,8 +1,10 @@
 """Makes a multiview folder from a recording that another program has calibrated."""
 
+import os
 import re
 import shutil
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +16,9 @@ from ico3d.capture.importing.settings import ImportSettings
 from ico3d.capture.importing.transforms import read_transforms
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.reader import MultiviewCapture
-from ico3d.capture.multiview.writing import new_folder, shown
+from ico3d.capture.multiview.writing import shown
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
+from ico3d.capture.writing.new_folder import new_folder
 from ico3d.errors import CaptureError
 
 NEARLY = np.cos(np.radians(20))
@@ -41,6 +44,7 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
         CaptureError: If `out` exists, the source is of an unknown kind, or a file is damaged.
     """
     foreign = _read(source, settings.images)
+    _check_once(foreign)
     cameras, frames = _grouped(foreign)
     turn = _upright(foreign)
     places = tuple(
@@ -51,7 +55,7 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
     sources = (f"{foreign.tool}: {source.resolve().name}",)
     told = (settings.consent, settings.licence, settings.shows, settings.likeness)
     about = Description(settings.fps, count, places, sources, *told)
-    with new_folder(out) as work:
+    with new_folder(out, settings.likeness, sources) as work:
         _copy(work, places, cameras, frames)
         if foreign.points is not None:
             (work / "points").mkdir()
@@ -77,6 +81,18 @@ def _read(source: Path, images: Path | None) -> Foreign:
             "images.bin, or .txt)."
         )
     return read_colmap(model, images or _images_near(source, model))
+
+
+def _check_once(foreign: Foreign) -> None:
+    """Each picture belongs to one camera and one time; a copy for each would fill the disk.
+
+    Raises:
+        CaptureError: If one is listed twice.
+    """
+    counts = Counter(shot.file for shot in foreign.shots)
+    doubled = next((file for file, count in counts.items() if count > 1), None)
+    if doubled is not None:
+        raise CaptureError(f"{foreign.tool}: the picture {doubled} is listed twice.")
 
 
 def _images_near(source: Path, model: Path) -> Path:
@@ -145,27 +161,37 @@ def _names(cameras: list[list[Shot]]) -> list[str]:
     """A name for each camera: of its folder if that is its own, else of its first picture."""
     folders = [{shot.file.parent for shot in shots} for shots in cameras]
     users = Counter(folder for used in folders for folder in used)
-    names: list[str] = []
+    names, taken = list[str](), Counter[str]()
     for shots, used in zip(cameras, folders, strict=True):
         (folder, *more) = used
         own = len(shots) > 1 and not more and users[folder] == 1
         plain = re.sub(r"[^A-Za-z0-9_.-]", "_", folder.name if own else shots[0].file.stem)
         plain = f"camera{plain}" if plain[:1] in (".", "-", "") else plain
-        names.append(_free(plain[:80], names))
+        names.append(_free(plain[:80], taken))
     return names
 
 
-def _free(name: str, taken: list[str]) -> str:
-    """The name, with a number behind it if it is taken; case does not tell names apart."""
-    known = {one.lower() for one in taken}
-    tries = [name, *(f"{name}_{number}" for number in range(2, len(taken) + 3))]
-    return next(one for one in tries if one.lower() not in known)
+def _free(name: str, taken: Counter[str]) -> str:
+    """The name, with a number behind it if it is taken; case does not tell names apart.
+
+    Args:
+        name: What is wanted.
+        taken: Names in small letters, and the last number that stands behind each; the new one is
+            added.
+    """
+    free = name
+    while free.lower() in taken:  # numbers go on where they were: thousands may want one name
+        taken[name.lower()] += 1
+        free = f"{name}_{taken[name.lower()]}"
+    taken[free.lower()] = 1
+    return free
 
 
 def _copy(
     work: Path, places: tuple[Place, ...], cameras: list[list[Shot]], frames: list[list[int]]
 ) -> None:
     """Copies pictures and masks as they are."""
+    copies: dict[Path, Path] = {}
     with shown("copying", sum(map(len, cameras))) as advance:
         for place, shots, numbers in zip(places, cameras, frames, strict=True):
             for shot, frame in zip(shots, numbers, strict=True):
@@ -174,5 +200,15 @@ def _copy(
                         suffix = file.suffix.lower()
                         target = work / kind / place.lens.name / f"{frame:06d}{suffix}"
                         target.parent.mkdir(parents=True, exist_ok=True)
-                        shutil.copyfile(file, target)
+                        _place(file, target, copies)
                 advance()
+
+
+def _place(file: Path, target: Path, copies: dict[Path, Path]) -> None:
+    """Copies a file, once: masks may be of many pictures, which share one copy."""
+    if file in copies:
+        with suppress(OSError):  # not all disks have a second name for a file
+            os.link(copies[file], target)
+            return
+    copies[file] = target
+    shutil.copyfile(file, target)

@@ -13,8 +13,8 @@ from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.parallel import View, each_camera
-from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait.files import save_picture
+from ico3d.capture.writing.new_folder import new_folder
 from ico3d.common.camera import Camera
 from ico3d.rig import body_track
 
@@ -49,7 +49,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
         known["likeness"],
     )
     cameras = range(len(capture.cameras))
-    with new_folder(out) as work:
+    with new_folder(out, about.likeness, about.sources) as work:
 
         def start(camera: int) -> View:
             opened = ResizedCapture(open_capture(source), height)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from ico3d.capture.lens import Lens
 from ico3d.capture.poses import rigid
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.people.stated import NOT_STATED
 from ico3d.errors import CaptureError
 
@@ -92,8 +93,8 @@ def read_description(folder: Path) -> Description:
     if not isinstance(entries, list) or not entries:
         raise CaptureError(f"{file} lists no cameras.")
     places = tuple(_place(file, index, entry) for index, entry in enumerate(entries))
-    names = [place.lens.name.lower() for place in places]
-    doubled = next((name for name in names if names.count(name) > 1), None)
+    names = Counter(place.lens.name.lower() for place in places)
+    doubled = next((name for name, count in names.items() if count > 1), None)
     if doubled is not None:
         raise CaptureError(f"{file}: two cameras are called {doubled}.")
     shows = content.get("shows", "body")
@@ -119,7 +120,7 @@ def read_json(file: Path) -> dict:
         CaptureError: If the file is missing or damaged.
     """
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(read_small(file).decode("utf-8"))
     except FileNotFoundError as error:
         raise CaptureError(f"{file} is missing.") from error
     except (OSError, ValueError, RecursionError) as error:

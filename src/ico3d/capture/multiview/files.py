@@ -1,5 +1,7 @@
 """The files of a multiview folder: pictures as recorded, with lens distortion."""
 
+import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from ico3d.capture.multiview.clip import Clip, OpenClips
 from ico3d.errors import CaptureError
 
 PICTURES = (".png", ".jpg", ".jpeg")
+_FRAME = re.compile(r"(\d{6,8})\.(?:png|jpe?g)")
 VIDEOS = (".mp4", ".mkv", ".mov", ".webm", ".avi")
 
 
@@ -77,6 +80,21 @@ class RecordedFiles:
     def file(self, kind: str, camera: int, frame: int) -> Path | None:
         """Path of a picture (kind "images") or a mask (kind "masks"), or None if missing."""
         return _existing(self.folder / kind / self._lenses[camera].name, f"{frame:06d}")
+
+    def listed(self, kind: str, camera: int, frames: int) -> set[int]:
+        """Numbers of the frames that have a file as `file` finds it; the folder is read once.
+
+        Args:
+            kind: "images" or "masks".
+            camera: The camera.
+            frames: Numbers from here on are left out.
+        """
+        try:
+            with os.scandir(self.folder / kind / self._lenses[camera].name) as entries:
+                found = {int(m[1]) for e in entries if (m := _FRAME.fullmatch(e.name))}
+        except OSError:
+            return set()
+        return {n for n in found if n < frames and self.file(kind, camera, n) is not None}
 
     def is_damaged(self, kind: str, camera: int, frame: int) -> bool:
         """Whether the first bytes of an existing file show that it is no picture of this camera."""

@@ -173,35 +173,62 @@ class MultiviewCapture(RecordedCapture):
 
     def _inspect_pictures(self) -> Finding:
         """Whether every camera has every frame."""
-        missing, damaged = [], []
+        missing, damaged = _Missing(), list[tuple[str, int]]()
         for camera, lens in enumerate(self.lenses):
             clip = self.files.clip(camera)
             if clip is not None:
-                missing += [(lens.name, f) for f in range(clip.count, self.num_frames)]
+                missing.add(lens.name, clip.count, self.num_frames - clip.count)
                 continue
-            for frame in range(self.num_frames):
-                if self.files.file("images", camera, frame) is None:
-                    missing.append((lens.name, frame))
-                elif self.files.is_damaged("images", camera, frame):
-                    damaged.append((lens.name, frame))
-        return missing_and_damaged("views", len(self.lenses) * self.num_frames, missing, damaged)
+            listed = self.files.listed("images", camera, self.num_frames)
+            missing.add(lens.name, _gap(listed), self.num_frames - len(listed))
+            damaged += self._damaged("images", camera, listed)
+        total = len(self.lenses) * self.num_frames
+        return missing_and_damaged("views", total, missing.first, damaged, missing.further)
 
     def _inspect_masks(self) -> Finding:
         """Whether every picture has a mask."""
-        missing, damaged, total = [], [], 0
+        missing, damaged, total = _Missing(), list[tuple[str, int]](), 0
         for camera, lens in enumerate(self.lenses):
             clip = self.files.clip(camera)
-            for frame in range(self.num_frames if clip is None else clip.count):
-                if clip is None and self.files.file("images", camera, frame) is None:
-                    continue
-                total += 1
-                if self.files.file("masks", camera, frame) is None:
-                    missing.append((lens.name, frame))
-                elif self.files.is_damaged("masks", camera, frame):
-                    damaged.append((lens.name, frame))
-        return missing_and_damaged("mask files", total, missing, damaged)
+            masks = self.files.listed("masks", camera, self.num_frames)
+            if clip is None:
+                pictures = self.files.listed("images", camera, self.num_frames)
+                absent, wanted = pictures - masks, len(pictures)
+                missing.add(lens.name, min(absent, default=0), len(absent))
+            else:
+                pictures, wanted = {n for n in masks if n < clip.count}, clip.count
+                missing.add(lens.name, _gap(pictures), wanted - len(pictures))
+            total += wanted
+            damaged += self._damaged("masks", camera, pictures & masks)
+        return missing_and_damaged("mask files", total, missing.first, damaged, missing.further)
+
+    def _damaged(self, kind: str, camera: int, frames: set[int]) -> list[tuple[str, int]]:
+        """Camera and frame of files that are no pictures of this camera."""
+        name = self.lenses[camera].name
+        return [(name, n) for n in sorted(frames) if self.files.is_damaged(kind, camera, n)]
 
     def _index(self, frame: int) -> int:
         if not 0 <= frame < self.num_frames:
             raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
         return frame
+
+
+class _Missing:
+    """The first missing file, and how many more: a folder may claim millions of frames."""
+
+    def __init__(self):
+        """Starts with none."""
+        self.first: list[tuple[str, int]] = []
+        self.further = 0
+
+    def add(self, camera: str, frame: int, count: int) -> None:
+        """Adds files of a camera, of which that of a frame is the first."""
+        if count > 0 and not self.first:
+            self.first.append((camera, frame))
+            count -= 1
+        self.further += max(count, 0)
+
+
+def _gap(frames: set[int]) -> int:
+    """The lowest number that is not there."""
+    return next(n for n in range(len(frames) + 1) if n not in frames)

@@ -1,34 +1,10 @@
-"""Helpers for writing multiview folders."""
+"""Shows how far the writing of a recording is."""
 
-import secrets
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-from ico3d.errors import CaptureError
-
-
-@contextmanager
-def new_folder(out: Path) -> Iterator[Path]:
-    """A temporary folder that becomes `out` after the `with` block, or is removed if it raises.
-
-    Raises:
-        CaptureError: If `out` exists.
-    """
-    if out.exists():
-        raise CaptureError(f"{out} exists already: remove it or choose another folder.")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    work = out.with_name(f".{out.name}.{secrets.token_hex(4)}")
-    work.mkdir()  # not mkdtemp: who may read it is for the umask to say
-    try:
-        yield work
-        work.rename(out)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Reads the talking-portrait layout, written by ico3d or by other programs."""
 
+from collections import Counter
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
@@ -323,7 +324,7 @@ def _ids(path: Path, name: str, transforms: dict) -> tuple[int, ...]:
     ids = [i for i in given if isinstance(i, int) and i >= 0]
     if len(ids) < len(given):
         raise CaptureError(f"{file}: every frame needs a whole img_id of 0 or more.")
-    doubled = sorted({i for i in ids if ids.count(i) > 1}) if len(set(ids)) < len(ids) else []
+    doubled = sorted(i for i, count in Counter(ids).items() if count > 1)
     if doubled:
         raise CaptureError(f"{file}: frame {doubled[0]} is listed twice.")
     off = next((f for f in frames if f.get("aud_id", f["img_id"]) != f["img_id"]), None)

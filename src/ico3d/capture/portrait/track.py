@@ -13,7 +13,6 @@ from ico3d.capture.face.mediapipe_face import (
     CanonicalFace,
     canonical_face,
 )
-from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait import cutout, parsing, rigid_head
 from ico3d.capture.portrait.details import notes_of, reprojection_error, save_details
 from ico3d.capture.portrait.exposure import even_out
@@ -26,6 +25,7 @@ from ico3d.capture.portrait.settings import CUTOUTS, PortraitSettings
 from ico3d.capture.progress import Reached, tracked
 from ico3d.capture.surface.first_points import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
+from ico3d.capture.writing.new_folder import new_folder
 from ico3d.common.spread import spread
 from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
@@ -60,7 +60,7 @@ def track_portrait(
         from ico3d.splat.device import computing_device
 
         computing_device(settings.device)  # better known now than after the tracking
-    with new_folder(out) as work:
+    with new_folder(out, settings.likeness, (video.name,)) as work:
         _write(work, opened, model, settings, reached)
     console.print(f"[green]capture written to {out}[/]; look at it: ico3d capture check {out}")
 

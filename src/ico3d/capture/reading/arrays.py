@@ -28,6 +28,8 @@ def read_numbers(file: Path) -> np.ndarray:
         CaptureError: If the file holds none, or one of anything but real numbers.
     """
     try:
+        if file.exists() and not file.is_file():  # a pipe is waited for
+            raise OSError("it is no regular file")
         # Mapped, an array cannot claim more memory than the file has.
         mapped = np.load(file, mmap_mode="r", allow_pickle=False)
     except UNREADABLE as error:

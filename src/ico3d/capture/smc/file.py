@@ -23,6 +23,8 @@ MOST_ROWS = 100_000
 """Largest number of frames, and of rows of a table where any number is allowed."""
 MOST_VALUES = 16
 """Largest number of values in an attribute."""
+MOST_LINKS, LONGEST_LINK = 32, 4096
+"""Links by name on one path, and letters of what one names; links in a circle have no end."""
 _NUMBER = re.compile("[0-9]{1,9}")
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What h5py raises for damaged files."""
@@ -187,16 +189,29 @@ class SmcFile:
     def _find(self, inside: str) -> Any:
         """A group or dataset by its path ("" is the file), or None.
 
-        Links must not lead into other files.
+        Links must not lead into other files, also not by way of a link within this one: what a
+        soft link names is looked up name by name as well.
         """
-        node = self._file()
-        for part in filter(None, inside.split("/")):
+        h5py, root = hdf5(PURPOSE), self._file()
+        node, waiting, links = root, _names(inside), 0
+        while waiting:
+            part = waiting.pop()
             link = node.get(part, getlink=True) if _is(node, "Group") else None
             if link is None:
                 return None
-            if not isinstance(link, (hdf5(PURPOSE).HardLink, hdf5(PURPOSE).SoftLink)):
+            if isinstance(link, h5py.SoftLink):
+                links += 1
+                path = link.path
+                if links > MOST_LINKS or not isinstance(path, str) or len(path) > LONGEST_LINK:
+                    raise self._damaged(inside)
+                waiting += _names(path)
+                node = root if path.startswith("/") else node
+                continue
+            if not isinstance(link, h5py.HardLink):
                 raise self._damaged(inside)
             node = node[part]
+        if node.file.filename != root.filename:
+            raise self._damaged(inside)
         return node
 
     def _file(self) -> Any:
@@ -224,6 +239,11 @@ class SmcFile:
 
     def _damaged(self, inside: str) -> CaptureError:
         return CaptureError(f"{self.path}: {inside} is damaged: fetch the file again.")
+
+
+def _names(path: str) -> list[str]:
+    """The names of a path, the last one first; "." is where one is."""
+    return [name for name in reversed(path.split("/")) if name not in ("", ".")]
 
 
 def _fits(found: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:

@@ -1,13 +1,13 @@
 """Looks at pictures and parts with the face tracker, or, where it is missing, at their light."""
 
-import io
 import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import UnidentifiedImageError
 
+from ico3d.capture.decoding import open_picture
 from ico3d.capture.face.mediapipe_face import FaceReader
 from ico3d.capture.video import open_video, opened, read_sound
 from ico3d.common.typed import plain
@@ -28,8 +28,6 @@ MOST_SIDE = 2000
 """Largest side of a picture that a page may send."""
 RATE = 3.0
 """Pictures per second of a part that are looked at."""
-MOST_SCANS = 64
-"""Passes over a JPEG picture; a small file of thousands of them takes minutes to decode."""
 MIDDLE = 0.3
 """Share of a picture at each edge that is left out where nobody knows where the face is."""
 OF_A_WHOLE = ("turns", "length", "lips", "exposure", "camera")
@@ -154,11 +152,13 @@ def _check_size(file: Path) -> None:
     """Refuses a video whose pictures would fill the memory, before one is decoded.
 
     Raises:
-        Refused: If its file states larger ones than are taken.
+        Refused: If its file states larger ones than are taken, or promises what it cannot hold.
     """
     try:
         opened(file).close()
     except CaptureError as error:
+        if error.code == "decoding":
+            raise no_video() from error
         text = "the pictures of this video are larger than is taken."
         raise Refused("large", text, 413) from error
 
@@ -182,13 +182,13 @@ def _of_consent(file: Path) -> dict[str, Any]:
 
 def _decoded(jpeg: bytes) -> np.ndarray:
     """(H, W, 3) uint8 RGB."""
-    if jpeg.count(b"\xff\xda") > MOST_SCANS:
-        raise Refused("picture", "the picture has an unusual form.", 422)
     try:
-        with Image.open(io.BytesIO(jpeg), formats=["JPEG"]) as image:
+        with open_picture(jpeg, "the picture", ("JPEG",)) as image:
             if max(image.size) > MOST_SIDE or min(image.size) < 32:
                 raise Refused("picture", "the picture has an unusual size.", 422)
             return np.asarray(image.convert("RGB"))
+    except CaptureError as error:
+        raise Refused("picture", "the picture has an unusual form.", 422) from error
     except (UnidentifiedImageError, OSError, ValueError) as error:
         raise Refused("picture", "this is no JPEG picture.", 415) from error
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import MOST_BYTES, read_small, write_atomic
 from ico3d.common.spz.container import GZIP_MAGIC, MAGIC
 from ico3d.errors import GaussianFileError, SettingsError
 from ico3d.splat.files import compressed_ply, ply, splat, spz, standard_ply
@@ -40,10 +40,8 @@ def read_file(path: Path | str) -> GaussianFile:
     """Reads a file of 3D Gaussians and names its format; errors as for `read_gaussians`."""
     path = Path(path)
     try:
-        with path.open("rb") as file:
-            kind = _recognise(file.read(_HEAD_BYTES), path)
-            file.seek(0)
-            data = file.read()
+        data = read_small(path, most=MOST_BYTES)
+        kind = _recognise(data[:_HEAD_BYTES], path)
         named, gaussians = _read(kind, data)
         return GaussianFile(named, gaussians.checked())
     except OSError as error:

@@ -1,0 +1,1 @@
+"""Writes folders of recordings so that none is ever half there."""

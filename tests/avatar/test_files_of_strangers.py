@@ -1,0 +1,41 @@
+"""Files of folders by anybody that are links to devices, or pipes: one sentence, at once."""
+
+import os
+
+import pytest
+
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.camera_path import read_key_cameras
+from ico3d.body.model_folder import TrainedBody
+from ico3d.bundle.format import read_background
+from ico3d.capture.multiview.description import read_json
+from ico3d.capture.reading.arrays import read_numbers
+from ico3d.capture.synthetic import SyntheticCapture
+from ico3d.errors import Ico3dError
+from ico3d.head.model_folder import TrainedHead
+from ico3d.scene.model_folder import TrainedScene
+from ico3d.splat.files.formats import read_file
+
+READERS = {
+    "cameras.json": lambda folder: read_json(folder / "cameras.json"),
+    "points.npy": lambda folder: read_numbers(folder / "points.npy"),
+    "capture.json": SyntheticCapture,
+    "head.json": TrainedHead.load,
+    "body.json": TrainedBody.load,
+    "scene.json": TrainedScene.load,
+    "avatar.json": TrainedAvatar.load,
+    "path.json": lambda folder: read_key_cameras(folder / "path.json", 8, 8),
+    "splats.ply": lambda folder: read_file(folder / "splats.ply"),
+    "background.ply": lambda folder: read_background(folder / "background.ply"),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("pipe", [True, False])
+def test_what_has_no_end_is_not_read(tmp_path, name, pipe):
+    if pipe:
+        os.mkfifo(tmp_path / name)
+    else:
+        (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(Ico3dError):
+        READERS[name](tmp_path)
