@@ -65,6 +65,7 @@ PROMISING = {
     ),
     "still pictures": box(b"meta", box(b"iloc", b"\2", bytes(5), struct.pack(">I", MANY))),
     "names of still pictures": box(b"meta", table(b"iinf", MANY, head=1 << 24)),
+    "edits": box(b"moov", box(b"trak", box(b"edts", table(b"elst", promises.MOST_EDITS + 1)))),
     "compressed": box(b"moov", box(b"cmov", box(b"dcom", b"zlib"))),
     "tracks": box(b"moov", *[track()] * (promises.MOST_TRACKS + 1)),
     "in odd places": box(b"moov", track(box(b"stsd", bytes(11), LONG))),
@@ -89,6 +90,22 @@ def test_a_film_that_promises_more_than_it_holds_is_not_opened(tmp_path, monkeyp
     for read in (lambda: open_video(film, 48), lambda: read_sound(film), lambda: Clip(film).count):
         with pytest.raises(CaptureError, match="promise more than the file can hold"):
             read()
+
+
+def test_each_edit_counts_as_a_copy_of_the_samples(tmp_path, monkeypatch):
+    monkeypatch.setattr(promises, "MOST_SAMPLES", 1000)
+    film = tmp_path / "a.mp4"
+    for edits, samples, refused in ((1, 1000, False), (2, 500, False), (2, 501, True)):
+        edit = box(b"edts", table(b"elst", edits, *(samples, 0, 1 << 16) * edits))
+        tables = (table(b"stts", 1, samples, 512), table(b"stsz", 1, samples))
+        content = track(*tables)
+        content = box(b"trak", edit, content[8:])
+        film.write_bytes(BEGIN + box(b"mdat", bytes(9_999)) + box(b"moov", content))
+        if refused:
+            with pytest.raises(CaptureError, match="promise more"):
+                check_promises(film)
+        else:
+            assert check_promises(film)
 
 
 def test_samples_are_bounded_in_large_files_too(tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ico3d.chat.serving import server
+from ico3d.chat.serving.page_files import PageFiles
 
 SCRIPT, SHEET, PICTURE = "assets/index-C0ffee00.js", "assets/index-C0ffee00.css", "assets/x-1.png"
 TEXTS = {
@@ -163,6 +164,12 @@ async def test_compressed_files_have_no_address_of_their_own(page):
     for suffix in (".gz", ".br"):
         answer, _ = await raw(page, SCRIPT + suffix)
         assert answer.status_code == 404
+
+
+@pytest.mark.parametrize("path", ["/a" * 9, "/" + "a" * 512, "/a%2f" + "a%2f" * 8, "//a" * 5])
+async def test_a_path_longer_than_any_of_the_page_is_not_looked_for(page, monkeypatch, path):
+    monkeypatch.setattr(PageFiles, "lookup_path", lambda *_: pytest.fail("the disk is asked"))
+    assert (await page.get(path)).status_code == 404
 
 
 async def test_a_page_that_was_built_without_them_is_served_plain(tmp_path, monkeypatch):

@@ -22,12 +22,15 @@ FIRST = frozenset(
 """Names of boxes with which files begin that FFmpeg takes for MP4 or QuickTime."""
 OPAQUE = frozenset(b"mdat wide skip junk uuid pnot ftyp styp prft emsg inst".split())
 """Outer boxes in which FFmpeg looks for no tables."""
-TRACK, HANDLER, TIMES, CHUNKS, PACKED = b"trak", b"hdlr", b"stts", b"stsc", b"cmov"
+TRACK, HANDLER, EDITS = b"trak", b"hdlr", b"elst"
+TIMES, CHUNKS, PACKED = b"stts", b"stsc", b"cmov"
 SIZES, OFFSETS, ITEMS = (b"stsz", b"stz2"), (b"stco", b"co64"), (b"iloc", b"iinf")
 PIECES = (b"trun", b"senc", b"saiz")
-TABLES = (TRACK, HANDLER, TIMES, CHUNKS, PACKED, *SIZES, *OFFSETS, *ITEMS, *PIECES)
+TABLES = (TRACK, HANDLER, EDITS, TIMES, CHUNKS, PACKED, *SIZES, *OFFSETS, *ITEMS, *PIECES)
 """Names of boxes that are looked for."""
 MOST_TRACKS = 32
+MOST_EDITS = 64
+"""Stretches of a track that are played one after the other; each may copy all of its samples."""
 MOST_SAMPLES = 1 << 23
 """Pictures and packets of sound: 1,000 a second for two hours; each takes some forty bytes."""
 MOST_ITEMS = 1 << 16
@@ -54,6 +57,7 @@ class _Track:
     times: list[np.ndarray] = field(default_factory=list)  # (E, 2) each: how many, how long
     chunks: list[np.ndarray] = field(default_factory=list)  # (E, 3) each: first, samples, kind
     offsets: int = 0
+    edits: int = 0
     kinds: list[bytes] = field(default_factory=list)
 
     @property
@@ -64,6 +68,11 @@ class _Track:
         ticks = any(len(entries) == 1 and entries[0, 1] == 1 for entries in self.times)
         chunks = sum(self._in_chunks(entries) for entries in self.chunks) if ticks else 0
         return max(self.samples, float(times), chunks)
+
+    @property
+    def copied(self) -> float:
+        """Samples, with the copies that FFmpeg makes of them for edits."""
+        return self.promised * max(self.edits, 1)
 
     @property
     def is_plain_sound(self) -> bool:
@@ -125,8 +134,8 @@ def _check(file: BinaryIO, size: int) -> None:
         more = _count(_content(file, start, end), end - start, tracks)
         pieces, items = pieces + more[0], items + more[1]
     every = pieces + sum(track.promised for track in tracks)
-    sounds = sum(track.promised for track in tracks if track.is_plain_sound)
-    if every > size or every - sounds > MOST_SAMPLES or items > MOST_ITEMS:
+    made = pieces + sum(track.copied for track in tracks if not track.is_plain_sound)
+    if every > size or made > MOST_SAMPLES or items > MOST_ITEMS:
         raise _Broken
 
 
@@ -224,6 +233,10 @@ def _count(data: bytes, length: int, tracks: list[_Track]) -> tuple[int, int]:
                 raise _Broken
         elif name == HANDLER:
             track.kinds.append(data[body + 8 : body + 12])
+        elif name == EDITS:
+            track.edits += _number(data, body + 4)
+            if track.edits > MOST_EDITS:
+                raise _Broken
         elif name in SIZES:
             track.samples += _number(data, body + 8)
         elif name == TIMES:

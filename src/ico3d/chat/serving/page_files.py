@@ -15,6 +15,7 @@ from mimetypes import guess_type
 from pathlib import Path
 
 from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Scope
@@ -27,6 +28,8 @@ FOR_EVER = "public, max-age=31536000, immutable"
 ASK_AGAIN = "no-cache"
 TYPES = {".css": "text/css", ".html": "text/html", ".js": "text/javascript"}
 """Content types that the machine's own table must not change: browsers check those of scripts."""
+LONGEST, DEEPEST = 512, 8
+"""Letters and folders of a path that is looked for: the system looks at every folder of it."""
 WEIGHT = re.compile(r"0(\.\d{0,3})?|1(\.0{0,3})?")
 
 
@@ -37,6 +40,13 @@ class PageFiles(StaticFiles):
         """Serves the files of `folder`; / gives `index.html`, /NAME also `NAME.html`."""
         super().__init__(directory=folder, html=True)
         self._hashed = folder.resolve() / HASHED
+
+    def get_path(self, scope: Scope) -> str:
+        """The path of a request within the folder; none that no page's file has is looked at."""
+        path = scope["path"]
+        if len(path) > LONGEST or path.count("/") > DEEPEST:
+            raise HTTPException(404)
+        return super().get_path(scope)
 
     def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
         """Finds a file; compressed variants cannot be requested by name."""
