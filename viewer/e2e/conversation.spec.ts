@@ -18,7 +18,7 @@ describe('a typed question', () => {
     const { page } = browser;
     await until(browser, finished(0), 30_000); // the greeting
     expect(await page.locator('#answer').textContent()).toBe('Hello.');
-    expect(await page.locator('#stand-ins').textContent()).toBe('Kept simple, to run offline: hearing, answers, voice');
+    expect(await page.locator('#stand-ins').textContent()).toBe('Small offline services listen, answer, and speak');
 
     await page.evaluate(() => {
       const { head, conversation } = window.ico3d!;

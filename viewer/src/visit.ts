@@ -128,8 +128,9 @@ export class Visit {
     let offered = () => {}; // says anew what headsets may do
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
     root.dataset.path = stage.painter.path;
-    watchCover(root, signal, (pixels) => stage.keepClear(pixels));
-    const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '', home: server.home() }, this.overlay, () => stage.figures, signal);
+    watchCover(root, signal, (all, controls) => stage.keepClear(all, controls));
+    const talker = { name, languages: manifest.persona.languages ?? [], home: server.home() };
+    const page = makePage(root, words, talker, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };
     const corner = root.querySelector<HTMLElement>('.figures')!;

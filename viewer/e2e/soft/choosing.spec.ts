@@ -50,9 +50,12 @@ describe('a page that chooses by itself what draws', () => {
   test('takes the processor where WebGL is software, fetches nothing of WebGL, and has words for a headset', async () => {
     const { browser, page } = await open(talkingUrl, ({ page }) => plugIn(page));
     expect(await drawn(page)).toEqual(['soft', expect.stringMatching(/^the processor, as there is no graphics card.*SwiftShader/)]);
-    await page.click('.xr >> text=Enter VR');
-    expect(await page.locator('#notices').textContent()).toMatch(/^VR and AR need a graphics card/);
-    expect(await page.locator('.xr button').first().getAttribute('title')).toMatch(/^VR and AR need a graphics card/);
+    const button = page.locator('.xr button').first();
+    expect(await button.getAttribute('aria-disabled')).toBe('true');
+    expect(await page.isVisible('#xr-reason')).toBe(false);
+    await button.focus();
+    expect(await page.isVisible('#xr-reason')).toBe(true); // as long as the focus is there
+    expect(await page.textContent('#xr-reason')).toMatch(/^VR and AR need a graphics card/);
     expect(await fetched(page)).toEqual(['painter']); // and nothing for headsets
     await browser.close();
   });

@@ -208,7 +208,7 @@ test('the visitor chooses language and captions, which are remembered; all of it
   expect(await page.textContent('#state')).toMatch(/^(Bereit|Spricht)$/);
   expect(await page.getAttribute('#text', 'placeholder')).toBe('Fragen Sie etwas');
   expect(await page.getAttribute('.views button', 'title')).toBe('Gesicht (1)');
-  expect(await page.textContent('#stand-ins')).toBe('Einfach gehalten, um offline zu laufen: Gehör, Antworten und Stimme');
+  expect(await page.textContent('#stand-ins')).toBe('Kleine Offline-Dienste hören zu, antworten und sprechen');
   expect(await page.textContent('#record .divider')).toMatch(/^Ein neues Gespräch/);
   expect(await page.getAttribute('#captions', 'lang')).toBe(''); // nobody told which one she speaks
   await page.keyboard.press('Tab');

@@ -39,7 +39,7 @@ export class Stage {
   /** Called when the browser takes the picture away and does not give it back. */
   onGone: () => void = () => {};
   private readonly quality = new Quality(ladder({ backdrop: false, gaussians: false }));
-  private covered = 0; // pixels at the lower edge that controls lie on
+  private covered = { all: 0, controls: 0 }; // pixels at the lower edge
   private readonly canvas: HTMLCanvasElement;
   private readonly manifest: Manifest;
   private readonly actors: Actor[] = [];
@@ -208,9 +208,14 @@ export class Stage {
     this.dirty = true;
   }
 
-  /** Keeps faces clear of so many pixels at the lower edge. */
-  keepClear(pixels: number): void {
-    this.covered = pixels;
+  /**
+   * Keeps faces clear of all that lies at the lower edge, and whole figures clear of the controls.
+   *
+   * @param all pixels that controls or captions lie on
+   * @param controls pixels that controls lie on
+   */
+  keepClear(all: number, controls = all): void {
+    this.covered = { all, controls };
     this.fit();
   }
 
@@ -348,7 +353,8 @@ export class Stage {
     if (!width || !height || painter.presenting) return;
     const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS);
     painter.fit(width, height, ratio, this.size || this.fine ? 1 : this.quality.level.pixels);
-    this.orbit.fit({ aspect: width / height, free: Math.max(LEAST_FREE, 1 - this.covered / (clientHeight || height)) });
+    const share = (pixels: number) => Math.max(LEAST_FREE, 1 - pixels / (clientHeight || height));
+    this.orbit.fit({ aspect: width / height, free: share(this.covered.all), clear: share(this.covered.controls) });
     this.dirty = true;
   }
 }

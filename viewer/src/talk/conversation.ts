@@ -1,4 +1,5 @@
 import { SoundGuard } from '../audio/interruption.ts';
+import { Loudness } from '../audio/loudness.ts';
 import { Player } from '../audio/player.ts';
 import type { Cue, Offer, PlaceMessage, Release, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { codeOf, english, say } from '../words/text.ts';
@@ -71,6 +72,7 @@ export class Conversation {
   private readonly connection: Connection;
   private readonly voice: VoiceInput;
   private readonly timer = new TurnTimer();
+  private readonly loudness = new Loudness((gain) => (this.player.output.gain.value = gain));
   private readonly handlers: Handlers<SessionMessage> = {
     state: ({ state }) => this.show(state),
     transcript: ({ text, final }) => this.transcript(text, final),
@@ -199,7 +201,16 @@ export class Conversation {
 
   /** How loud the avatar is, from 0 to 1. */
   set volume(volume: number) {
-    this.player.output.gain.value = Math.min(1, Math.max(0, volume));
+    this.loudness.volume = volume;
+  }
+
+  /** Whether the avatar is not heard: it speaks on, and moves its lips. */
+  get muted(): boolean {
+    return this.loudness.muted;
+  }
+
+  set muted(muted: boolean) {
+    this.loudness.muted = muted;
   }
 
   /** Push to talk: from here to `release` all that the microphone hears is one turn. */
@@ -209,6 +220,16 @@ export class Conversation {
 
   release(): void {
     this.voice.release();
+  }
+
+  /** Whether what the visitor says by the button is heard: it takes a while until the microphone is open. */
+  get hearsButton(): boolean {
+    return this.voice.hearsButton;
+  }
+
+  /** Whether nobody talks, listens or thinks. */
+  get isQuiet(): boolean {
+    return this.state === 'idle' && !this.voice.hearsButton;
   }
 
   /** Hangs up for good: nothing is heard, said or sent any more. */

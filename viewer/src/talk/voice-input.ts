@@ -8,6 +8,8 @@ import { Listening, type ListeningView } from './listening.ts';
 import { Recovery } from './recovery.ts';
 
 const AGAIN = say('microphone.again');
+const EARLY = say('microphone.early');
+const SOME_WORDS = 500; // ms: who holds the button so long before the microphone is open has said something
 const SILENCE = { pieces: 10, milliseconds: 100 }; // that is told when the microphone closes
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
@@ -37,6 +39,7 @@ export class VoiceInput {
   private state: MicrophoneState = 'closed'; // open: what it hears is sent
   private held = false; // the button to talk is
   private talking = false; // and the server was told
+  private letGo = 0; // when it was, ms on the performance clock
   private closing: ReturnType<typeof setTimeout> | undefined;
   private silence: ReturnType<typeof setInterval> | undefined;
 
@@ -73,6 +76,11 @@ export class VoiceInput {
     return this.state !== 'closed';
   }
 
+  /** Whether what is said while the button is held is sent. */
+  get hearsButton(): boolean {
+    return this.talking;
+  }
+
   /** Whether what the visitor says is sent. */
   get listens(): boolean {
     return this.state === 'open' || this.talking;
@@ -96,7 +104,10 @@ export class VoiceInput {
   async press(): Promise<void> {
     if (this.ended || this.held) return;
     this.held = true;
+    const pressed = performance.now();
     const open = await this.start();
+    const until = this.held ? performance.now() : this.letGo;
+    if (open && until - pressed > SOME_WORDS) this.view.notice(EARLY);
     // The button may be up again, or down for the second time: browsers take their time to ask.
     if (this.held && !this.talking) this.talking = open && this.send({ type: 'talk', pressed: true });
     this.held = this.talking;
@@ -104,6 +115,7 @@ export class VoiceInput {
   }
 
   release(): void {
+    if (this.held) this.letGo = performance.now();
     this.held = false;
     if (!this.talking) return;
     this.talking = false;

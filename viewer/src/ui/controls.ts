@@ -1,9 +1,12 @@
+import { rememberedInTab, rememberInTab } from '../remembered.ts';
 import type { Conversation } from '../talk/conversation.ts';
 import type { MicrophoneState } from '../talk/voice-input.ts';
+import { foreignTo } from '../words/foreign.ts';
 import type { PageWords } from '../words/page-words.ts';
-import { say, type Sentence } from '../words/text.ts';
+import { say, type Sentence, type Tongue } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
+import { isForOthers } from './keys.ts';
 
 const CLICK = 350; // ms; who clicks the button to talk does not know that it is held
 
@@ -17,12 +20,14 @@ export class Controls {
   private readonly microphone: HTMLButtonElement;
   private readonly talk: HTMLButtonElement;
   private readonly stop: HTMLButtonElement;
+  private readonly mute: HTMLButtonElement;
 
   /**
    * @param root what keys are heard in
+   * @param languages of the talk, BCP 47; none for any
    * @param signal ends the hearing
    */
-  constructor(root: HTMLElement, words: PageWords, signal: AbortSignal) {
+  constructor(root: HTMLElement, words: PageWords, languages: readonly string[], signal: AbortSignal) {
     this.root = root;
     this.words = words;
     this.signal = signal;
@@ -31,10 +36,14 @@ export class Controls {
     this.microphone = byId(root, 'microphone');
     this.talk = byId(root, 'talk');
     this.stop = byId(root, 'stop');
+    this.mute = byId(root, 'mute');
     this.microphone.append(icon('microphone'));
     this.talk.append(icon('talk'));
     this.stop.prepend(icon('stop'));
     byId(root, 'send').append(icon('send'));
+    const ask = () => words.write(this.input, askIn(foreignTo(words.language, languages)), 'placeholder');
+    words.onChange(ask, signal);
+    ask();
   }
 
   /** Shows itself and lets the visitor act on a conversation. */
@@ -49,6 +58,7 @@ export class Controls {
     this.microphone.onclick = () => void conversation.toggleMicrophone();
     this.stop.onclick = () => conversation.interrupt();
     this.bindTalk(conversation, notice);
+    this.bindMute(conversation);
     this.hear('keydown', (event) => {
       if (event.key === 'Escape') conversation.interrupt();
       if (event.key === '/' && this.takesSlash(event)) {
@@ -56,6 +66,25 @@ export class Controls {
         this.input.focus();
       }
     });
+  }
+
+  /** The button turns the avatar's sound off and on, and so does M; the tab remembers it. */
+  private bindMute(conversation: Conversation): void {
+    const show = (muted: boolean) => {
+      conversation.muted = muted;
+      this.mute.setAttribute('aria-pressed', String(muted));
+      this.mute.replaceChildren(icon(muted ? 'muted' : 'sound'));
+      this.words.write(this.mute, say(muted ? 'mute.on' : 'mute.off'), 'title');
+    };
+    const toggle = () => {
+      show(!conversation.muted);
+      rememberInTab('muted', String(conversation.muted));
+    };
+    this.mute.onclick = toggle;
+    this.hear('keydown', (event) => {
+      if (event.key.toLowerCase() === 'm' && !event.repeat && !isForOthers(event)) toggle();
+    });
+    show(rememberedInTab('muted') === 'true');
   }
 
   /** The button is held with a pointer, or with the space bar wherever that types nothing. */
@@ -117,4 +146,9 @@ export class Controls {
     this.stop.classList.toggle('gone', !speaking);
     this.stop.inert = !speaking;
   }
+}
+
+/** What the text box asks for; who talks in foreign languages is asked in the first of them. */
+function askIn([first]: readonly Tongue[]): Sentence {
+  return first ? say('ask.in', { language: first }) : say('ask');
 }

@@ -3,14 +3,15 @@ import { byId } from './elements.ts';
 
 const MUCH = 0.1; // of the picture's height, which is a gap when it stays free
 const CALM = 4000; // ms for which it does
+const PASSING = new Set(['captions', 'stop', 'silenced']); // what comes and goes with what is said
 const SETTLING = 1000; // ms after a change of the picture's size, in which all finds its place
 
 /**
  * Tells how many pixels at the lower edge the controls and captions cover, whenever they cover more
  * than before in a picture of this size: what was there once comes again, and the picture must not
- * jump each time. Much that stays free for some seconds is given back. Notices do not count; they go.
+ * jump each time. `controls` are those under the captions. Much that stays free for some seconds is given back. Notices do not count; they go.
  */
-export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixels: number) => void): void {
+export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixels: number, controls: number) => void): void {
   const main = root.querySelector('main')!;
   const picture = byId(root, 'stage');
   let size = '';
@@ -21,12 +22,13 @@ export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixe
     const before = size;
     const { width, height, bottom } = picture.getBoundingClientRect();
     size = `${width}x${height}`;
-    const tops = [...main.children].filter(isCover).map((child) => child.getBoundingClientRect().top);
-    const covered = Math.max(0, bottom - Math.min(bottom, ...tops));
+    const covers = [...main.children].filter(isCover);
+    const under = (elements: readonly Element[]) => Math.max(0, ...elements.map((element) => bottom - element.getBoundingClientRect().top));
+    const [covered, controls] = [under(covers), under(covers.filter(({ id }) => !PASSING.has(id)))];
     clearTimeout(freeing);
     const take = () => {
       most = covered;
-      changed(most);
+      changed(most, controls);
     };
     if (size !== before) sized = performance.now();
     if (performance.now() - sized < SETTLING || covered > most) take();

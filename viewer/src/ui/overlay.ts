@@ -3,6 +3,7 @@ import { nameOf, type Manifest } from '../bundle/manifest.ts';
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
+import { foreignTo } from '../words/foreign.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
@@ -23,6 +24,7 @@ export class Overlay {
   private readonly button: HTMLButtonElement;
   private readonly words: PageWords;
   private readonly reload: () => void;
+  private readonly signal: AbortSignal;
   private queued = false;
   private counting: ReturnType<typeof setTimeout> | undefined;
 
@@ -40,6 +42,7 @@ export class Overlay {
     this.waiting = byId(page, 'overlay-wait');
     this.button = byId(page, 'again');
     this.reload = reload;
+    this.signal = signal;
     this.cover(true);
     atEnd(signal, () => clearTimeout(this.counting));
   }
@@ -56,6 +59,16 @@ export class Overlay {
     this.thumbnail.crossOrigin = 'anonymous'; // it may be another server's
     this.thumbnail.src = thumbnail;
     this.thumbnail.onload = () => (this.thumbnail.hidden = false);
+    this.tellLanguages(manifest);
+    this.words.onChange(() => this.tellLanguages(manifest), this.signal);
+  }
+
+  /** Says which languages somebody speaks who does not speak the page's. */
+  private tellLanguages(manifest: Manifest): void {
+    const languages = foreignTo(this.words.language, manifest.persona.languages);
+    const told = byId(this.root, 'speaks');
+    told.hidden = languages.length === 0;
+    if (languages.length > 0) this.words.write(told, say('start.speaks', { name: nameOf(manifest), languages }));
   }
 
   /** @param coming what is on its way */

@@ -36,8 +36,8 @@ export function makePage(
   figures: () => Figures,
   signal: AbortSignal,
 ): Page {
-  const captions = new Captions(root, talker.lang, signal);
-  const controls = new Controls(root, words, signal);
+  const captions = new Captions(root, talker.languages[0] ?? '', signal);
+  const controls = new Controls(root, words, talker.languages, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
   const memory = new Memory(root, words, talker.home);
@@ -76,7 +76,7 @@ export function makePage(
       announce();
     },
     services(services, offers) {
-      showStandIns(root, words, services);
+      showStandIns(root, words, services, offers.length > 0);
       sheet.show(services, offers);
     },
     memory: (offered, tell) => memory.offer(offered, tell),
@@ -112,13 +112,17 @@ export function makePage(
   return { view, talk };
 }
 
-/** Says plainly which services are the small offline ones. */
-function showStandIns(root: ParentNode, words: PageWords, services: Services): void {
+/**
+ * Says plainly which services are the small offline ones.
+ *
+ * @param choice whether the settings offer others
+ */
+function showStandIns(root: ParentNode, words: PageWords, services: Services, choice: boolean): void {
   const simple = (['recognition', 'language', 'voice'] as const).filter((kind) => services[kind].stand_in);
   const names = simple.map((kind) => say(`stand-ins.${kind}`));
   const note = byId(root, 'stand-ins');
   note.hidden = names.length === 0;
-  words.write(note, say('stand-ins', { names }));
+  words.write(note, say(choice ? 'stand-ins' : 'stand-ins-only', { names }));
 }
 
 /** Shows a sentence for some seconds; one that is there already stays as it is: many would cover the face. */

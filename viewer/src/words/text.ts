@@ -19,7 +19,14 @@ export function addTexts(more: Texts): void {
   TEXTS = { ...TEXTS, ...more };
 }
 
-export type Values = Readonly<Record<string, string | number | Message | readonly (string | Message)[]>>;
+/** A language, which is named in the language of the sentence around it. */
+export interface Tongue {
+  tongue: string; // BCP 47
+}
+
+type One = string | Message | Tongue;
+
+export type Values = Readonly<Record<string, One | number | readonly One[]>>;
 
 /** A sentence of the page, before anybody knows in which language. */
 export interface Message {
@@ -75,6 +82,11 @@ function formOf(text: Text, { n }: Values, language: Language): string {
 function valueOf(value: Values[string] | undefined, language: Language): string {
   if (value === undefined) throw new Error('a text lacks one of its values');
   if (typeof value === 'number') return new Intl.NumberFormat(language).format(value);
-  if (typeof value === 'string' || !('length' in value)) return textOf(value, language);
-  return new Intl.ListFormat(language, { type: 'unit' }).format(value.map((one) => textOf(one, language)));
+  if (typeof value === 'string' || !('length' in value)) return oneOf(value, language);
+  return new Intl.ListFormat(language, { type: 'conjunction' }).format(value.map((one) => oneOf(one, language)));
+}
+
+function oneOf(value: One, language: Language): string {
+  if (typeof value === 'string' || !('tongue' in value)) return textOf(value, language);
+  return new Intl.DisplayNames(language, { type: 'language' }).of(value.tongue) ?? value.tongue;
 }

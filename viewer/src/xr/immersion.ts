@@ -7,6 +7,7 @@ import { Arc } from './teleport.ts';
 import { Board } from './board.ts';
 import { Glance } from './glance.ts';
 import type { XrMode, XrPorts } from './ports.ts';
+import { Reminder } from './reminder.ts';
 import { APART, Rig } from './rig.ts';
 import { VoiceInSpace } from './sound.ts';
 import { Stick } from './stick.ts';
@@ -43,6 +44,8 @@ export class Immersion implements Presentation {
   private aim: { by: XRInputSource; at: THREE.Vector3 } | null = null; // m in the headset's space
   private met = false;
   private readonly followed = new Set<Key>(); // hints after which the visitor has talked
+  private readonly reminder = new Reminder();
+  private reminds = false; // of what was followed already
   private unseen = 0; // s for which the avatar has been out of sight
 
   /**
@@ -109,7 +112,9 @@ export class Immersion implements Presentation {
     if (!this.met) this.meet();
     for (const source of this.session.inputSources) this.steer(source, frame, space);
     xr.updateCamera(this.camera);
+    this.tools.heard = this.ports.conversation?.hearsButton ?? false;
     this.tools.update(frame, space);
+    this.remind(step);
     this.attend(step);
   }
 
@@ -241,11 +246,20 @@ export class Immersion implements Presentation {
     return new THREE.Vector3(0, 0, -1).transformDirection(this.head);
   }
 
+  /** After a quiet while the visitor is told again, above all how to leave. */
+  private remind(step: number): void {
+    const talks = this.tools.talking.size > 0 || !(this.ports.conversation?.isQuiet ?? true);
+    const reminds = this.reminder.pass(step, talks);
+    if (reminds === this.reminds) return;
+    this.reminds = reminds;
+    this.advise();
+  }
+
   /** Tells how the present tools are used, until the visitor has talked by them. */
   private advise(): void {
     const { conversation, words } = this.ports;
     const hint = this.hint();
-    this.board.advise(conversation && !this.followed.has(hint.key) ? words.text(hint) : '');
+    this.board.advise(conversation && (this.reminds || !this.followed.has(hint.key)) ? words.text(hint) : '');
   }
 
   private hint(): Message {

@@ -3,11 +3,12 @@ import { icon } from '../ui/icons.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { XR_MODES, type XrMode, type XrPorts } from './ports.ts';
 
+const REASON = 'xr-reason';
 const ICONS = { 'immersive-vr': 'headset', 'immersive-ar': 'room' } as const;
 
 /**
  * Offers VR and AR where the device has them, also when a headset is plugged in later. What draws for
- * headsets is fetched only then. Where the processor draws, the buttons say that it cannot be.
+ * headsets is fetched only then. Where the processor draws, the buttons are dim and say that it cannot be.
  *
  * @param bar takes the buttons
  * @param notice shows why it does not work
@@ -22,6 +23,7 @@ export function offerXr(bar: HTMLElement, ports: XrPorts, notice: (sentence: Sen
   const show = async () => {
     const modes = await offered(xr);
     group.replaceChildren(...modes.map((mode) => makeButton(mode, ports, notice)));
+    if (!isPossible(ports)) group.append(...modes.slice(0, 1).map(() => makeReason(ports)));
     const [best] = modes;
     ports.stage.enterXr = best ? () => enter(best, ports) : null;
     if (best && isPossible(ports)) await import('./immersion.ts'); // a session must begin right after the click
@@ -48,9 +50,22 @@ function makeButton(mode: XrMode, ports: XrPorts, notice: (sentence: Sentence) =
   const name = document.createElement('span');
   ports.words.write(name, say(`xr.${mode}`));
   button.append(icon(ICONS[mode]), name);
-  if (!isPossible(ports)) ports.words.write(button, say('xr.soft'), 'title');
+  if (!isPossible(ports)) {
+    button.setAttribute('aria-disabled', 'true');
+    button.setAttribute('aria-describedby', REASON);
+    button.onclick = () => button.focus(); // as after a click in every browser; the reason stands there until the focus goes
+    return button;
+  }
   button.onclick = () => enter(mode, ports).catch((error: unknown) => notice(sentenceOf(error)));
   return button;
+}
+
+/** Why the buttons do nothing; it is seen as long as one of them has the focus or the pointer. */
+function makeReason({ words }: XrPorts): HTMLElement {
+  const reason = document.createElement('p');
+  reason.id = REASON;
+  words.write(reason, say('xr.soft'));
+  return reason;
 }
 
 async function enter(mode: XrMode, ports: XrPorts): Promise<void> {

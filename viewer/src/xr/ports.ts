@@ -10,7 +10,7 @@ export type XrMode = (typeof XR_MODES)[number];
 /** What a headset shows, and how one talks there. */
 export interface XrPorts {
   stage: Stage;
-  conversation?: Pick<Conversation, 'player' | 'press' | 'release'>; // none of a body alone
+  conversation?: Pick<Conversation, 'player' | 'press' | 'release' | 'hearsButton' | 'isQuiet'>; // none of a body alone
   head?: Head;
   root: ParentNode; // of the page, whose captions and notices are shown in space, too
   words: PageWords;

@@ -17,8 +17,10 @@ interface Shown {
  * to be fetched from somewhere, or the hands' joints.
  */
 export class Tools extends THREE.Group {
-  /** Those by which the visitor talks now. */
+  /** Those by which the visitor wants to talk now. */
   readonly talking = new Set<XRInputSource>();
+  /** Whether they are heard: only then it is shown. */
+  heard = false;
   private readonly shown = new Map<XRInputSource, Shown>();
   private readonly ball = new THREE.SphereGeometry(1, 20, 12);
   private readonly handle = this.ball.clone().scale(...HANDLE);
@@ -29,7 +31,7 @@ export class Tools extends THREE.Group {
     for (const source of this.shown.keys()) if (!sources.includes(source)) this.drop(source);
     for (const source of sources) {
       const shown = this.shown.get(source) ?? this.take(source);
-      (shown.object.material.uniforms.colour!.value as THREE.Color).setHex(this.talking.has(source) ? TALKING : PLAIN, THREE.LinearSRGBColorSpace); // as it is displayed
+      (shown.object.material.uniforms.colour!.value as THREE.Color).setHex(this.heard && this.talking.has(source) ? TALKING : PLAIN, THREE.LinearSRGBColorSpace); // as it is displayed
       shown.object.visible = shown.joints ? showHand(shown.joints, source, frame, space) : hold(shown.object, source, frame, space);
     }
   }

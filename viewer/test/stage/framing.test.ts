@@ -124,6 +124,23 @@ describe('the other views of somebody', () => {
     }
   });
 
+  test('the whole figure reaches down to the controls of a phone, though captions lie over the legs', () => {
+    const [aspect, free, clear] = [390 / 844, 0.6, 0.85];
+    for (const { sitter, fov } of cases) {
+      const at = (clear?: number) => {
+        const view = figure(sitter, fov)({ aspect, free, clear });
+        const [crown, feet] = [sitter.crown, -sitter.lowest].map((above) => place(view, aspect, sitter.eyes.clone().addScaledVector(sitter.up, above))[1]);
+        return { crown: crown!, feet: feet! };
+      };
+      const [tall, small] = [at(clear), at()];
+      expect(tall.crown).toBeGreaterThan(0);
+      expect(tall.feet).toBeLessThan(clear);
+      if (sitter.lowest < 1.4) continue; // the arms of a child need the width
+      expect(tall.feet).toBeGreaterThan(0.78); // feet near the controls, not in the middle of the picture
+      expect(tall.feet - tall.crown).toBeGreaterThan(1.2 * (small.feet - small.crown));
+    }
+  });
+
   test('the face is larger than in the first view, and whole', () => {
     for (const { sitter, fov, aspect, free } of cases) {
       const [near, first] = [closeUp, portrait].map((framing) => framing(sitter, fov)({ aspect, free }));

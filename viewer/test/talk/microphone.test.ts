@@ -141,6 +141,27 @@ test('a button that is let go while the browser asks leaves no microphone open',
   expect([audio.records, audio.running, sent()]).toEqual([false, 0, 0]);
 });
 
+test.each([
+  [800, true, 'let go'],
+  [800, false, 'held on'],
+  [100, true, 'let go soon'],
+])('words of %i ms before the microphone is open are lost, and the page says so (let go: %s)', async (milliseconds, letGo, how) => {
+  void conversation.press();
+  await pass(milliseconds);
+  expect(conversation.hearsButton).toBe(false); // nothing shows that somebody is heard
+  if (letGo) conversation.release();
+  audio.prompts[0]!.allow();
+  await pass();
+  audio.sounds();
+  await pass();
+  expect(conversation.hearsButton).toBe(!letGo);
+  expect(notices).toEqual(how === 'let go soon' ? [] : ['The microphone has only just opened: please say it again.']);
+  conversation.release();
+  await conversation.press(); // it is open still
+  expect([conversation.hearsButton, notices.length]).toEqual([true, how === 'let go soon' ? 0 : 1]);
+  conversation.release();
+});
+
 test('turning the microphone off leaves the button to talk what it needs', async () => {
   await open();
   await conversation.press();

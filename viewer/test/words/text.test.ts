@@ -1,6 +1,7 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
+import { foreignTo } from '../../src/words/foreign.ts';
 import { codeOf, english, isKey, languageOf, LANGUAGES, say, textOf, type Key, type Language } from '../../src/words/text.ts';
 import studio from '../../src/words/studio.json';
 import texts from '../../src/words/texts.json';
@@ -65,7 +66,17 @@ describe('a sentence', () => {
   });
 
   test('lists what there are several of', () => {
-    expect(textOf(say('stand-ins', { names: ['A', say('stand-ins.voice')] }), 'de')).toBe('Einfach gehalten, um offline zu laufen: A, Stimme');
+    const names = [say('stand-ins.recognition'), say('stand-ins.language'), say('stand-ins.voice')];
+    expect(textOf(say('stand-ins', { names }), 'en')).toBe('Small offline services listen, answer, and speak; better ones are in the settings');
+    expect(textOf(say('stand-ins-only', { names: names.slice(1) }), 'de')).toBe('Kleine Offline-Dienste antworten und sprechen');
+    for (const language of languages) expect(textOf(say('stand-ins', { names }), language).length).toBeLessThan(105); // two lines of a phone
+  });
+
+  test('names a language in the language of the sentence', () => {
+    expect(textOf(say('ask.in', { language: { tongue: 'en' } }), 'de')).toBe('Auf Englisch fragen');
+    expect(textOf(say('ask.in', { language: { tongue: 'de' } }), 'ja')).toBe('ドイツ語で質問');
+    const languages = [{ tongue: 'en' }, { tongue: 'de' }];
+    expect(textOf(say('start.speaks', { name: 'Iris', languages }), 'es')).toBe('Iris entiende y habla inglés y alemán.');
   });
 
   test('of somebody else stays as it is, and a value that is missing is no secret', () => {
@@ -74,6 +85,17 @@ describe('a sentence', () => {
     expect(() => english(say('queue.place'))).toThrow('lacks one of its values');
     expect(english({ key: 'server.voiceless', english: 'Its voice is gone (no sound).' })).toBe('Its voice is gone (no sound).');
     expect(textOf({ key: 'server.voiceless', english: 'Gone.' }, 'es')).toMatch(/^El avatar se ha quedado sin voz/);
+  });
+});
+
+describe('whoever speaks', () => {
+  test('none of the page’s languages speaks others, which are told', () => {
+    expect(foreignTo('de', ['en', 'pt-BR'])).toEqual([{ tongue: 'en' }, { tongue: 'pt-BR' }]);
+    expect(foreignTo('zh', ['en'])).toEqual([{ tongue: 'en' }]);
+  });
+
+  test('the page’s language, in whichever country, or who may speak any, is not foreign', () => {
+    expect([foreignTo('en', ['de', 'en-GB']), foreignTo('de', []), foreignTo('fr')]).toEqual([[], [], []]);
   });
 });
 

@@ -5,7 +5,8 @@ import type { Sitter } from './sitter.ts';
 /** The shape of the picture that is to be filled. */
 export interface Picture {
   aspect: number; // width / height
-  free: number; // share of the height, from above, that no control lies on
+  free: number; // share of the height, from above, that neither controls nor captions lie on
+  clear?: number; // the same without captions, which may lie on legs; `free` where it is not known
 }
 
 /** Where the camera stands for a picture. */
@@ -90,17 +91,18 @@ function composition(
 }
 
 /**
- * Frames somebody from crown to feet, level, between the upper edge and the controls.
+ * Frames somebody from crown to feet, level, between the upper edge and the controls. Captions come
+ * and go over the legs: a gap for them would leave somebody small in the upper half of a phone.
  *
  * @param fov degrees, from top to bottom
  */
 export function figure({ eyes, toward, up, crown, lowest }: Sitter, fov: number): Framing {
   const slope = Math.tan(THREE.MathUtils.degToRad(fov) / 2);
   const level = toward.clone().projectOnPlane(up).normalize();
-  return ({ aspect, free }) => {
+  return ({ aspect, free, clear = free }) => {
     const length = crown + ABOVE + lowest + GROUND;
-    const height = Math.max(length / (free - MARGIN), ARMS / aspect);
-    const room = free * height - length; // over the head and under the feet
+    const height = Math.max(length / (clear - MARGIN), ARMS / aspect);
+    const room = clear * height - length; // over the head and under the feet
     const middle = crown + ABOVE + room / 2 - height / 2; // over the eyes
     const target = eyes.clone().addScaledVector(up, middle);
     const eye = target.clone().addScaledVector(level, height / (2 * slope));

@@ -8,6 +8,8 @@ import { Disclosure } from './disclosure.ts';
 import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
 
+/** What a name alone does not tell. */
+const ABOUT: Partial<Record<Key, Key>> = { 'figure.evaluate': 'figure.evaluate.about', 'figure.quality': 'figure.quality.about' };
 const PERIOD = 1000; // ms between updates
 
 /** The small panel with figures: frame rate, latency and its parts. */
@@ -76,7 +78,8 @@ export class Panel {
     let cell = this.rows.get(name);
     if (!cell) {
       const term = document.createElement('dt');
-      this.words.write(term, say(name));
+      term.append(this.worded('span', name));
+      if (ABOUT[name]) term.append(this.worded('small', ABOUT[name]));
       cell = document.createElement('dd');
       this.list.append(term, cell);
       this.rows.set(name, cell);
@@ -108,6 +111,12 @@ export class Panel {
     });
     row.append(head, bar, ...figures);
     return row;
+  }
+
+  private worded(tag: 'span' | 'small', key: Key): HTMLElement {
+    const element = document.createElement(tag);
+    this.words.write(element, say(key));
+    return element;
   }
 
   private number(value: number, digits: number): string {

@@ -14,8 +14,8 @@ const END = 40; // pixels from the lower end within which the record follows wha
 /** Who talks. */
 export interface Talker {
   name: string;
-  /** Language of the talk, BCP 47; empty if it is unknown. */
-  lang: string;
+  /** Languages of the talk, BCP 47, the usual one first; none if they are unknown. */
+  languages: readonly string[];
   /** Address of its server. */
   home: string;
 }
@@ -109,7 +109,7 @@ export class Transcript {
     time.dateTime = entry.at.toISOString();
     time.textContent = this.clock(entry.at);
     row.append(who, ' ', time, this.paragraph(entry.text));
-    (row.lastElementChild as HTMLElement).lang = this.talker.lang;
+    (row.lastElementChild as HTMLElement).lang = this.talker.languages[0] ?? '';
     if (this.rows.size === 0 && !this.began) this.list.replaceChildren();
     this.list.append(row);
     this.rows.set(entry, row);
