@@ -1,6 +1,7 @@
 """Files are whole or not there."""
 
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,15 @@ def test_of_anybodys_files_only_small_regular_ones_are_read(tmp_path, monkeypatc
     monkeypatch.setattr(files, "MOST_NOTES", 1)
     with pytest.raises(OSError, match="no small file"):
         read_small(file)
+
+
+def test_a_small_file_takes_little_memory_whatever_may_be_read(tmp_path):
+    (tmp_path / "a").write_bytes(b"abc")
+    tracemalloc.start()
+    assert read_small(tmp_path / "a", most=files.MOST_BYTES) == b"abc"
+    assert read_small(tmp_path / "a") == b"abc"
+    assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    tracemalloc.stop()
 
 
 def test_folders_are_walked_as_by_the_system_and_links_are_not(tmp_path):

@@ -119,7 +119,7 @@ def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes
         about = os.fstat(opened.fileno())
         if not stat.S_ISREG(about.st_mode) or about.st_size > most:
             raise OSError(errno.EINVAL, "it is no small file", str(file))
-        return opened.read(most)
+        return opened.read(about.st_size)  # room for as many bytes is made at once
 
 
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
