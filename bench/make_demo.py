@@ -75,7 +75,7 @@ TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 110 --initial.gaussians 30000 --density.max-gaussians 55000 "
+    "--steps-per-frame 150 --initial.gaussians 30000 --density.max-gaussians 55000 "
     "--density.until 0.6 --joining.no-match-colors"
 )
 
