@@ -1,10 +1,12 @@
 """Damaged films, as `bench/fuzz` found them: read, or one sentence."""
 
 from fractions import Fraction
+from io import BytesIO
 
 import av
 import numpy as np
 import pytest
+from PIL import Image
 
 from ico3d.capture import decoding
 from ico3d.capture.multiview.clip import Clip
@@ -88,3 +90,18 @@ def test_pictures_with_a_side_that_ends_the_process_are_refused(tmp_path):
     for read in (lambda: open_video(film, 48), lambda: Clip(film).count, lambda: read_sound(film)):
         with pytest.raises(CaptureError, match="40000×8 pixels is larger than is taken"):
             read()
+
+
+def test_no_picture_larger_than_is_taken_is_decoded_while_a_film_is_opened(tmp_path, monkeypatch):
+    film, png = tmp_path / "a.mov", BytesIO()
+    Image.new("L", (200, 200)).save(png, "PNG")
+    with av.open(str(film), "w") as container:
+        stream = container.add_stream("png", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 64, "gray"
+        packet = av.Packet(png.getvalue())
+        packet.stream, packet.pts, packet.dts, packet.time_base = stream, 0, 0, Fraction(1, 25)
+        container.mux(packet)
+    monkeypatch.setattr(decoding, "MOST_PIXELS", 100 * 100)
+    # had it been decoded, its size would be known and told
+    with pytest.raises(CaptureError, match="cannot be decoded"):
+        open_video(film, 48)

@@ -23,6 +23,8 @@ FORMATS = (
     "yuv4mpegpipe"
 )
 """Other kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
+STREAMS = "32"
+"""Most streams of pictures and sound of a file; FFmpeg begins to decode each of them."""
 
 
 @dataclass
@@ -140,13 +142,17 @@ def opened(path: Path) -> Any:
     import av
 
     formats = BOXES if check_promises(path) else FORMATS
-    bounds = {"format_whitelist": formats, "protocol_whitelist": "file"}
-    container = av.open(str(path), metadata_errors="replace", container_options=bounds)
+    bounds = {"format_whitelist": formats, "protocol_whitelist": "file", "max_streams": STREAMS}
+    # pictures are decoded while a file is opened, of every stream
+    pixels = {"max_pixels": str(decoding.MOST_PIXELS)}
+    container = av.open(
+        str(path), metadata_errors="replace", container_options=bounds, options=pixels
+    )
     try:
         for stream in container.streams.video:
             if stream.codec_context is not None:
                 check_size(str(path), stream.codec_context.width, stream.codec_context.height)
-                stream.codec_context.options = {"max_pixels": str(decoding.MOST_PIXELS)}
+                stream.codec_context.options = pixels
     except CaptureError:
         container.close()
         raise
