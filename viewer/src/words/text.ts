@@ -83,7 +83,9 @@ function valueOf(value: Values[string] | undefined, language: Language): string 
   if (value === undefined) throw new Error('a text lacks one of its values');
   if (typeof value === 'number') return new Intl.NumberFormat(language).format(value);
   if (typeof value === 'string' || !('length' in value)) return oneOf(value, language);
-  return new Intl.ListFormat(language, { type: 'conjunction' }).format(value.map((one) => oneOf(one, language)));
+  // figures, such as seconds of a video, stand side by side; words are joined by an "and"
+  const type = value.some((one) => typeof one === 'string') ? 'unit' : 'conjunction';
+  return new Intl.ListFormat(language, { type }).format(value.map((one) => oneOf(one, language)));
 }
 
 function oneOf(value: One, language: Language): string {
