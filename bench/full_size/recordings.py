@@ -12,8 +12,8 @@ from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.headpose.track_file import HeadTrack
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
-from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait.files import save_picture
+from ico3d.capture.writing.new_folder import new_folder
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.expression import EYE_NAMES
 from ico3d.head.perceptual import CHANNELS, WEIGHTS, vgg_layers
