@@ -18,7 +18,9 @@ describe('a typed question', () => {
     const { page } = browser;
     await until(browser, finished(0), 30_000); // the greeting
     expect(await page.locator('#answer').textContent()).toBe('Hello.');
-    expect(await page.locator('#stand-ins').textContent()).toBe('Small offline services listen, answer, and speak');
+    expect(await page.locator('#stand-ins').textContent()).toBe(
+      'Small offline services listen, answer, and speak; better ones are in the settings',
+    );
 
     await page.evaluate(() => {
       const { head, conversation } = window.ico3d!;

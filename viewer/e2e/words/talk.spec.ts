@@ -146,17 +146,17 @@ test('who clicks the button to talk is told that it is held', async () => {
 test('on a phone she comes back to where there is room again, once captions have been short for some seconds', async () => {
   const { page } = browser;
   await page.setViewportSize({ width: 390, height: 844 });
-  const covered = () => page.evaluate(() => (window.ico3d!.stage as unknown as { covered: number }).covered);
+  const covered = () => page.evaluate(() => (window.ico3d!.stage as unknown as { covered: { all: number } }).covered.all);
   const ask = (text: string) => page.evaluate((text) => void (document.getElementById('question')!.textContent = text), text);
   await ask('');
   await page.waitForTimeout(1500); // all finds its place
   const few = await covered();
   await ask('a long question '.repeat(40));
-  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: number }).covered > few + 150, few);
+  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: { all: number } }).covered.all > few + 150, few);
   await ask('');
   await page.waitForTimeout(1000);
   expect(await covered()).toBeGreaterThan(few + 150); // the picture does not jump
-  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: number }).covered < few + 20, few, { timeout: 20_000 });
+  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: { all: number } }).covered.all < few + 20, few, { timeout: 20_000 });
   await page.setViewportSize({ width: 1280, height: 720 });
 });
 
@@ -208,7 +208,9 @@ test('the visitor chooses language and captions, which are remembered; all of it
   expect(await page.textContent('#state')).toMatch(/^(Bereit|Spricht)$/);
   expect(await page.getAttribute('#text', 'placeholder')).toBe('Fragen Sie etwas');
   expect(await page.getAttribute('.views button', 'title')).toBe('Gesicht (1)');
-  expect(await page.textContent('#stand-ins')).toBe('Kleine Offline-Dienste hören zu, antworten und sprechen');
+  expect(await page.textContent('#stand-ins')).toBe(
+    'Kleine Offline-Dienste hören zu, antworten und sprechen; bessere gibt es in den Einstellungen',
+  );
   expect(await page.textContent('#record .divider')).toMatch(/^Ein neues Gespräch/);
   expect(await page.getAttribute('#captions', 'lang')).toBe(''); // nobody told which one she speaks
   await page.keyboard.press('Tab');
