@@ -166,7 +166,7 @@ async def test_compressed_files_have_no_address_of_their_own(page):
         assert answer.status_code == 404
 
 
-@pytest.mark.parametrize("path", ["/a" * 9, "/" + "a" * 512, "/a%2f" + "a%2f" * 8, "//a" * 5])
+@pytest.mark.parametrize("path", ["/a" * 9, "/" + "a" * 512, "/a%2f" + "a%2f" * 8, "/a//" * 5])
 async def test_a_path_longer_than_any_of_the_page_is_not_looked_for(page, monkeypatch, path):
     monkeypatch.setattr(PageFiles, "lookup_path", lambda *_: pytest.fail("the disk is asked"))
     assert (await page.get(path)).status_code == 404

@@ -14,6 +14,8 @@ MOST = 0.75
 """Share of them that decides against a Gaussian's own colour: stitches that shine are no skin."""
 SHAFT = 0.2
 """How far up the shank shoes can reach."""
+FLOATING = 0.02
+"""Share of the Gaussians on feet that may lie below the soles."""
 FAINT = 0.1
 """A Gaussian that is less of clothes than this is none of them."""
 
@@ -44,7 +46,8 @@ def garments_of(body: BakedSkinned, cast: Cast, surfaces: Surfaces) -> np.ndarra
     ankle, knee = (np.mean([cast.place(f"{s}_{r}")[1] for s in SIDES]) for r in ("ankle", "knee"))
     height = body.means[:, 1]
     low = foot & (height < ankle)
-    shoe = foot & (height < (ankle + height[foot].min(initial=ankle)) / 2)
+    soles = np.append(height[sure & foot], ankle)  # a few may float far below
+    shoe = foot & (height < (ankle + np.quantile(soles, FLOATING)) / 2)
     shaft = lower & (height < ankle + SHAFT * (knee - ankle))
     trunk = np.isin(mainly, [j for role in ("hips", "spine") for j in cast.joints[role]])
     at_hem = trunk | (leg & ~lower)
