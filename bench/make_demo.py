@@ -72,7 +72,7 @@ HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
 BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=8)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
-    "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
+    "--steps 8000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
 )
 TRAIN_BODY = (
     "--steps-per-frame 150 --initial.gaussians 30000 --density.max-gaussians 55000 "

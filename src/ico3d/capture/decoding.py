@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from ico3d.capture.vetting.scans import has_many_scans
+from ico3d.common.files import check_regular
 from ico3d.errors import CaptureError
 
 FORMATS = ("JPEG", "PNG")
@@ -80,8 +81,8 @@ def open_picture(
         OSError: If it is missing, damaged, no regular file or of another kind; others of `DAMAGED`
             too.
     """
-    if isinstance(source, Path) and source.exists() and not source.is_file():
-        raise OSError(f"{source} is no regular file")  # a pipe is waited for
+    if isinstance(source, Path):
+        check_regular(source)
     stream = io.BytesIO(source) if isinstance(source, bytes) else source
     try:
         picture = Image.open(stream, formats=formats)

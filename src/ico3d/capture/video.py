@@ -11,7 +11,7 @@ from ico3d.capture import decoding
 from ico3d.capture.capture import Sound
 from ico3d.capture.decoding import check_size
 from ico3d.capture.sound import check_claim, joined
-from ico3d.capture.vetting.promises import check_promises
+from ico3d.capture.vetting.promises import MOST_TRACKS, check_promises
 from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
@@ -23,8 +23,6 @@ FORMATS = (
     "yuv4mpegpipe"
 )
 """Other kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
-STREAMS = "32"
-"""Most streams of pictures and sound of a file; FFmpeg begins to decode each of them."""
 
 
 @dataclass
@@ -142,7 +140,8 @@ def opened(path: Path) -> Any:
     import av
 
     formats = BOXES if check_promises(path) else FORMATS
-    bounds = {"format_whitelist": formats, "protocol_whitelist": "file", "max_streams": STREAMS}
+    bounds = {"format_whitelist": formats, "protocol_whitelist": "file"}
+    bounds["max_streams"] = str(MOST_TRACKS)  # FFmpeg begins to decode each
     # pictures are decoded while a file is opened, of every stream
     pixels = {"max_pixels": str(decoding.MOST_PIXELS)}
     container = av.open(

@@ -122,6 +122,18 @@ def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes
         return opened.read(about.st_size)  # room for as many bytes is made at once
 
 
+def check_regular(file: Path) -> None:
+    """Refuses what is there and no regular file: a pipe is waited for, and a device has no end.
+
+    For files that a library opens by their paths; `read_small` sees to it itself.
+
+    Raises:
+        OSError: If it is none.
+    """
+    if file.exists() and not file.is_file():
+        raise OSError(f"{file} is no regular file")
+
+
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
     """As `os.walk`, from above, but without an end of Python's stack in folders of anybody."""
     waiting = [os.fspath(folder)]

@@ -228,19 +228,24 @@ async def test_a_dropped_page_takes_its_place_in_the_queue_again(bundle):
                 await placed(last, 1)
 
 
+async def returned_too_often(url, session, is_taken):
+    """Comes back as often as one may at once, is refused, and waits until one may again."""
+    for _ in range(RETURNS_AT_ONCE):
+        async with wire(url, session) as again:
+            assert is_taken(await told(again))
+            again.transport.abort()
+    async with wire(url, session) as again:
+        await again.wait_closed()  # without a word that would end the session or the wait
+        assert again.close_code == 1013
+    await asyncio.sleep(1 / RETURNS)
+
+
 async def test_a_place_in_the_queue_is_not_taken_again_without_end(bundle):
     async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
         page, _ = await open_page(url, microphone=False)
         async with wire(url) as first:
             place = await told(first)
-            for _ in range(RETURNS_AT_ONCE):
-                async with wire(url, place.session) as again:
-                    assert (await told(again)).session == place.session
-                    again.transport.abort()
-            async with wire(url, place.session) as again:
-                await again.wait_closed()  # without a word that would end the wait
-                assert again.close_code == 1013
-            await asyncio.sleep(1 / RETURNS)
+            await returned_too_often(url, place.session, lambda t: t.session == place.session)
             async with wire(url, place.session) as again:
                 assert (await told(again)).session == place.session and len(sessions.line) == 1
         await page.close()
@@ -293,13 +298,6 @@ async def test_a_page_that_comes_back_without_end_has_to_wait(bundle):
     async with serving(bundle, TYPED) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         await dropped(page)
-        for _ in range(RETURNS_AT_ONCE):
-            async with wire(url, welcome.session) as again:
-                assert (await told(again)).resumed
-                again.transport.abort()
-        async with wire(url, welcome.session) as again:
-            await again.wait_closed()  # without a word that would end the session
-            assert again.close_code == 1013
-        await asyncio.sleep(1 / RETURNS)
+        await returned_too_often(url, welcome.session, lambda t: t.resumed)
         async with wire(url, welcome.session) as again:
             assert (await told(again)).resumed and len(sessions) == 1

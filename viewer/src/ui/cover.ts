@@ -9,7 +9,8 @@ const SETTLING = 1000; // ms after a change of the picture's size, in which all 
 /**
  * Tells how many pixels at the lower edge the controls and captions cover, whenever they cover more
  * than before in a picture of this size: what was there once comes again, and the picture must not
- * jump each time. `controls` are those under the captions. Much that stays free for some seconds is given back. Notices do not count; they go.
+ * jump each time. `controls` are those under the captions. Much that stays free for some seconds is
+ * given back. Notices do not count; they go.
  */
 export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixels: number, controls: number) => void): void {
   const main = root.querySelector('main')!;

@@ -5,6 +5,7 @@ from tokenize import TokenError
 
 import numpy as np
 
+from ico3d.common.files import check_regular
 from ico3d.errors import CaptureError
 
 UNREADABLE = (
@@ -28,8 +29,7 @@ def read_numbers(file: Path) -> np.ndarray:
         CaptureError: If the file holds none, or one of anything but real numbers.
     """
     try:
-        if file.exists() and not file.is_file():  # a pipe is waited for
-            raise OSError("it is no regular file")
+        check_regular(file)
         # Mapped, an array cannot claim more memory than the file has.
         mapped = np.load(file, mmap_mode="r", allow_pickle=False)
     except UNREADABLE as error:

@@ -14,6 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ico3d.common.files import check_regular
 from ico3d.errors import CaptureError
 
 FIRST = frozenset(
@@ -104,8 +105,7 @@ def check_promises(path: Path) -> bool:
             boxes than films have, or a compressed table of contents.
         OSError: If it cannot be read, or is no regular file.
     """
-    if path.exists() and not path.is_file():  # a pipe is waited for, a device has no end
-        raise OSError(f"{path} is no regular file")
+    check_regular(path)
     with path.open("rb") as file:
         if file.read(8)[4:] not in FIRST:
             return False

@@ -7,13 +7,13 @@ from ico3d.studio.person.growing.skull import Skull
 from ico3d.studio.person.growing.styles import Paths, clumped, smooth, unit, waves
 
 POINTS = 18
-"""Points of a strand from its root to where the hair is tied."""
+"""Points of a strand from its root to where the hair is tied, and of one in the tail."""
 PARTING = 0.009
 """Distance of the parting from the middle of the head, to the person's left, metres."""
 PARTING_END = (-0.035, 0.005)
 """Where the parting fades and where it is whole: metres in front of the middle of the head."""
-LOCKS, FINE_LOCKS = 170, 520
-"""Locks on a head, and the smaller ones in them."""
+LOCKS, FINE_LOCKS, TAIL_LOCKS = 170, 520, 60
+"""Locks on a head, the smaller ones in them, and those of a tail."""
 
 
 def parting(skull: Skull, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,10 +100,9 @@ def tail(line: np.ndarray, width: np.ndarray, count: int, random: np.random.Gene
         count: Number of strands.
         random: Source of all random choices.
     """
-    points_each = 18
     along = np.linspace(0, 1, len(line))
     reach = 1 - 0.30 * random.random(count) ** 2.0  # (N,)
-    t = np.linspace(0, 1, points_each) * reach[:, None]  # (N, K)
+    t = np.linspace(0, 1, POINTS) * reach[:, None]  # (N, K)
     middle = np.stack([np.interp(t, along, c) for c in line.T], -1)  # (N, K, 3)
     radius = np.sqrt(random.random(count))
     turn = random.uniform(0, 2 * np.pi, count)
@@ -113,11 +112,11 @@ def tail(line: np.ndarray, width: np.ndarray, count: int, random: np.random.Gene
     wide = np.interp(t, along, width) * radius[:, None]  # (N, K)
     points = middle + (wide * np.cos(turn)[:, None])[..., None] * side
     points += (wide * np.sin(turn)[:, None])[..., None] * back
-    lock = locks(points[:, 0], 60)[0]
+    lock = locks(points[:, 0], TAIL_LOCKS)[0]
     points = clumped(points, 0.2, 160, 0.7)
-    points += 0.004 * waves(60, points_each, 0.8, random)[lock]
-    points += 0.0016 * waves(count, points_each, 1.2, random)
+    points += 0.004 * waves(TAIL_LOCKS, POINTS, 0.8, random)[lock]
+    points += 0.0016 * waves(count, POINTS, 1.2, random)
     depth = np.broadcast_to(((1 - radius) ** 0.8)[:, None], t.shape)
-    taper = np.broadcast_to(1 - 0.75 * np.linspace(0, 1, points_each) ** 3, t.shape)
-    tone = np.exp(0.14 * random.standard_normal(60)[lock] + random.normal(0, 0.10, count))
+    taper = np.broadcast_to(1 - 0.75 * np.linspace(0, 1, POINTS) ** 3, t.shape)
+    tone = np.exp(0.14 * random.standard_normal(TAIL_LOCKS)[lock] + random.normal(0, 0.10, count))
     return Paths(points, depth, taper, tone)

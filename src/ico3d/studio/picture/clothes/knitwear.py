@@ -3,7 +3,7 @@
 import math
 
 from ico3d.splat.cpu.compile import subroutine
-from ico3d.studio.picture.clothes.relief import RIBBED, ROW, TWILL, stitch, twill
+from ico3d.studio.picture.clothes.relief import RIBBED, ROW, TWILL, ribbed, stitch, twill
 from ico3d.studio.picture.materials import Spot
 from ico3d.studio.picture.textures import grain, noise, smoothstep, visible
 
@@ -30,7 +30,7 @@ def jumper(colors, w, height, x, y, z, pixel):
     """
     # Wool is never quite even: broad, faint clouds, too soft to look like a pattern.
     tone = 1.0 + 0.03 * grain(x, 0.6 * y, z, 0.05, pixel)
-    rib = 1.0 - smoothstep(0.88, 1.12, w.hem)
+    rib = ribbed(w)
     seen = visible(ROW, 2.8 * pixel) * (1.0 - rib)
     # Stitches keep the mean tone: wool is as bright from far away as from near.
     tone *= 1.0 - seen * BETWEEN * (MEAN_STITCH - stitch(w.u, w.v))

@@ -86,10 +86,16 @@ def folds(w):
 
 
 @subroutine()
+def ribbed(w):
+    """How much a place on knitwear is of the ribs at its edges, 0 to 1."""
+    return 1.0 - smoothstep(0.88, 1.12, w.hem)
+
+
+@subroutine()
 def knit_height(w, pixel):
     """Height of ribs at the edges of knitwear, and of stitches; seams are shallow hollows."""
     height = 0.0
-    rib = 1.0 - smoothstep(0.88, 1.12, w.hem)
+    rib = ribbed(w)
     if rib > 0.0:
         round_ = 0.5 + 0.5 * math.cos(w.ribs * math.atan2(w.sine, w.cosine))
         height += rib * RIBBED * visible(0.0075, 1.8 * pixel) * round_ * (2.0 - round_)
