@@ -47,8 +47,9 @@ function makeButton(mode: XrMode, ports: XrPorts, notice: (sentence: Sentence) =
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'pill';
-  const name = document.createElement('span');
+  const name = document.createElement('span'); // phones have no room for it
   ports.words.write(name, say(`xr.${mode}`));
+  ports.words.name(button, say(`xr.${mode}`));
   button.append(icon(ICONS[mode]), name);
   if (!isPossible(ports)) {
     button.setAttribute('aria-disabled', 'true');

@@ -35,7 +35,7 @@ export async function plugIn(page: Page): Promise<void> {
 
 /** Clicks a button that enters VR or AR, and waits until the visitor is there. */
 export async function enter(page: Page, button: string): Promise<void> {
-  await page.click(`.xr >> text=${button}`);
+  await page.getByRole('button', { name: button }).click(); // in small windows it shows an icon alone
   await page.waitForFunction(() => window.ico3d!.stage.renderer.xr.isPresenting);
   await drawn(page, 2);
 }
