@@ -31,6 +31,7 @@ const visit: Visit = new Visit(document.body, new Server(new URL(location.href))
     if (seconds !== null) void import('./bench.ts').then(({ bench }) => bench(presence, Number(seconds) || undefined));
   },
   reload: () => location.reload(),
+  keeps: true,
   key: secrets.get('key'),
   unlock: (key) => {
     secrets.set('key', key);

@@ -23,6 +23,11 @@ export function rememberInTab(key: string, value: string): void {
   reach((storage) => storage.setItem(nameOf(key), value), ofTab);
 }
 
+/** Keeps nothing under a name any more until the tab is closed. */
+export function forgetInTab(key: string): void {
+  reach((storage) => storage.removeItem(nameOf(key)), ofTab);
+}
+
 function nameOf(key: string): string {
   return `ico3d-${key}`;
 }

@@ -1,7 +1,7 @@
 import { admit, byKey } from './admission.ts';
 import type { Body } from './body/body.ts';
 import type { SkinnedBody } from './body/skinned/body.ts';
-import { BundleFiles, filesToFirstSight, loadManifest, THUMBNAIL } from './bundle/load.ts';
+import { BundleFiles, filesToFirstSight, identityOf, loadManifest, THUMBNAIL } from './bundle/load.ts';
 import { blinkIndices, bodyOf, nameOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
 import type { Cast } from './cast.ts';
 import { PageError, sentenceOf } from './errors.ts';
@@ -70,6 +70,8 @@ export interface VisitPorts {
   key?: string | null;
   /** Tries a key that the visitor types; only where he may have one. */
   unlock?(key: string): void;
+  /** The tab keeps what was said, so that a reload does not lose it; the storage of a page around it is not ours. */
+  keeps?: boolean;
 }
 
 /**
@@ -129,7 +131,8 @@ export class Visit {
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, (all, controls) => stage.keepClear(all, controls));
-    const talker = { name, languages: manifest.persona.languages ?? [], home: server.home() };
+    const kept = this.ports.keeps ? identityOf(manifest) : null;
+    const talker = { name, languages: manifest.persona.languages ?? [], home: server.home(), kept };
     const page = makePage(root, words, talker, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };

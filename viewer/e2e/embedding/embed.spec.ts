@@ -165,6 +165,7 @@ describe('an avatar in the page of another origin', () => {
     await page.waitForFunction(() => window.sockets.every(({ readyState }) => readyState === WebSocket.CLOSED));
     await page.waitForFunction(() => window.contexts.every(({ state }) => state === 'closed'));
     expect(await page.evaluate(() => [window.sockets.length, window.contexts.length])).toEqual([1, 1]);
+    expect(await page.evaluate(() => Object.keys(sessionStorage))).toEqual([]); // of the talk, which is over, the site's storage has nothing
   });
 
   test('is nothing on a site that the server does not know', async () => {

@@ -42,6 +42,8 @@ async function visit(url: string): Promise<Browser> {
 }
 
 const focused = ({ page }: Browser) => page.evaluate(() => document.activeElement?.id);
+/** What the tab keeps of the talk. */
+const kept = ({ page }: Browser) => page.evaluate(() => Object.keys(sessionStorage).filter((key) => key.startsWith('ico3d-talk')).map((key) => sessionStorage.getItem(key)));
 const pressed = ({ page }: Browser) => page.getAttribute('#microphone', 'aria-pressed');
 
 /** Waits until the overlay says something. */
@@ -80,8 +82,10 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
   const places = (await readRecord(second.page)).received.filter(({ type }) => type === 'place');
   expect(new Set(places.map(({ session }) => session)).size).toBe(1);
   await first.page.evaluate((asking) => clearInterval(asking), asking);
+  expect(await kept(first)).toEqual([expect.stringContaining('Who are you?')]);
 
   await says(first, IDLE);
+  expect(await kept(first)).toEqual([]); // somebody else may begin the next one
   expect(await first.page.textContent('#again')).toBe('Talk again');
   expect(await focused(first)).toBe('again');
   expect(await first.page.isHidden('#overlay-wait')).toBe(true); // nobody may be there
@@ -98,6 +102,7 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
   await says(first, QUEUED);
   await says(second, IDLE);
   await goes(first);
+  expect(await first.page.textContent('#record')).not.toContain('Who are you?');
   expect(await pressed(first)).toBe('false');
 }, 300_000);
 

@@ -59,6 +59,7 @@ test('who agrees is remembered at the next visit, sees what is kept, and deletes
 
   await visit();
   expect(told).toEqual([[SAID]]);
+  expect(await page.locator('#record .divider').first().textContent()).toBe('Earlier'); // she was told of it
   expect(await page.isHidden('#memory-ask')).toBe(true);
   await page.click('#settings-button');
   await page.click('#memory-forget');

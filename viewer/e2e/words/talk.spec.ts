@@ -184,15 +184,17 @@ describe('the drawer', () => {
     await page.fill('#text', '');
   });
 
-  test('keeps the talk through a lost connection, and begins anew with a new session', async () => {
+  test('keeps the talk through a lost connection, and as an earlier one when a new session begins', async () => {
     const { page } = browser;
     const before = await record();
     await page.evaluate(() => window.record!.sockets.at(-1)!.close());
     await until(browser, ({ received }) => received.filter(({ type }) => type === 'welcome').length === 2, 30_000);
     expect(await record()).toEqual(before);
     await page.evaluate(() => window.ico3d!.conversation!.choose({ kind: 'language', key: 'persona-notes', name: '', hindrance: '' }));
-    await page.waitForFunction(() => document.querySelector('#record .divider')?.textContent!.startsWith('A new conversation'));
-    await page.waitForFunction(() => document.querySelectorAll('#record > div').length === 1); // the new greeting
+    await page.waitForFunction((count) => document.querySelectorAll('#record > div').length === count + 1, before.length); // the new greeting
+    expect((await record()).slice(0, -1)).toEqual(before);
+    expect(await page.locator('#record .divider').allTextContents()).toEqual(['Earlier: Stella no longer knows this', expect.stringMatching(/^A new conversation · /)]);
+    expect(await page.locator('#record > *').evaluateAll((rows) => rows.flatMap((row, at) => (row.matches('.divider') ? [at] : [])))).toEqual([0, before.length + 1]);
   });
 });
 
@@ -211,7 +213,7 @@ test('the visitor chooses language and captions, which are remembered; all of it
   expect(await page.textContent('#stand-ins')).toBe(
     'Kleine Offline-Dienste hören zu, antworten und sprechen; bessere gibt es in den Einstellungen',
   );
-  expect(await page.textContent('#record .divider')).toMatch(/^Ein neues Gespräch/);
+  expect(await page.locator('#record .divider').last().textContent()).toMatch(/^Ein neues Gespräch/);
   expect(await page.getAttribute('#captions', 'lang')).toBe(''); // nobody told which one she speaks
   await page.keyboard.press('Tab');
   await page.keyboard.press('Space');

@@ -62,6 +62,12 @@ export function filesToFirstSight({ head, body, skinned, files }: Manifest, alon
   return names.filter((name) => name in files);
 }
 
+/** Tells an avatar in the part that it plays from others, by what a page knows of both. */
+export function identityOf({ name, persona, files }: Manifest): string {
+  const head = HEAD_FILES.map((file) => files[file]?.sha256);
+  return JSON.stringify([name, persona.name, persona.greeting, persona.languages, ...head]);
+}
+
 /** What somebody is made of, in the order in which it is told. */
 export const PARTS = ['face', 'body', 'place'] as const;
 export type Part = (typeof PARTS)[number];

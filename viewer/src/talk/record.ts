@@ -11,25 +11,36 @@ export interface Entry {
 
 /** What is told of a record. */
 export interface RecordEvents {
-  /** An entry is new, or has changed. */
+  /** An entry of this talk is new, or has changed. */
   changed(entry: Entry): void;
-  /** All was forgotten; another talk begins. */
-  cleared(): void;
+  /** Another talk begins, or what was said is shown no more. */
+  renewed(): void;
 }
 
 const CUT = ' …';
 const ENDED = /[.!?。！？…]["'”’»)]*\s*$/; // answers come clause by clause
 const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]$/; // scripts that put no spaces between sentences
 
-/** All that was said in a talk, as far as it was heard. */
+/** All that was said in a talk, as far as it was heard, and in the talks before it. */
 export class TalkRecord {
   entries: Entry[] = [];
+  /** Of talks before this one, which is another one for the avatar. */
+  earlier: readonly Entry[];
   private readonly events: RecordEvents;
   private answer: { utterance: number; entry: Entry; sentences: Map<number, Progress> } | null = null;
   private resumed = false; // and nothing new was said
+  private closed = false; // the talk is over, and another visitor may begin the next one
 
-  constructor(events: RecordEvents) {
+  /** @param earlier what was said before the page was loaded anew */
+  constructor(events: RecordEvents, earlier: readonly Entry[] = []) {
     this.events = events;
+    this.earlier = earlier;
+  }
+
+  /** What stays for this visitor when another talk begins: talks in which they said something. */
+  get lasting(): readonly Entry[] {
+    if (this.closed) return [];
+    return this.entries.some(({ who }) => who === 'you') ? [...this.earlier, ...this.entries] : this.earlier;
   }
 
   /** The visitor has asked; after a lost connection the server may repeat the last question. */
@@ -79,10 +90,25 @@ export class TalkRecord {
   /** A session goes on, or a new one begins. */
   begin(resumed: boolean): void {
     this.resumed = resumed;
-    if (resumed) return;
+    if (!resumed) this.renew(this.lasting);
+  }
+
+  /** The server has ended the talk: whoever begins the next one may be somebody else. */
+  close(): void {
+    this.closed = true;
+  }
+
+  /** Forgets all that was said. */
+  clear(): void {
+    this.renew([]);
+  }
+
+  private renew(earlier: readonly Entry[]): void {
+    this.earlier = earlier;
+    this.closed = false;
     this.answer = null;
     this.entries = [];
-    this.events.cleared();
+    this.events.renewed();
   }
 
   private add(entry: Entry): void {

@@ -46,6 +46,7 @@ export function makePage(
   let again = () => {};
   const sheet = new ServiceSheet(root, words, (offer) => choose(offer));
   let hears = false; // whether the microphone is open
+  let isNew = true; // the session
   let now: Parameters<ConversationView['state']>[0] | null = null;
   const tellState = () => {
     if (now) words.write(byId(root, 'state'), say(now === 'idle' && hears ? 'state.open' : `state.${now}`));
@@ -79,7 +80,10 @@ export function makePage(
       showStandIns(root, words, services, offers.length > 0);
       sheet.show(services, offers);
     },
-    memory: (offered, tell) => memory.offer(offered, tell),
+    memory(offered, tell) {
+      const recalls = memory.offer(offered, tell);
+      if (isNew) transcript.showRecall(recalls);
+    },
     notice: (sentence) => showNotice(root, words, sentence),
     sharesVoice: (shared) => (byId(root, 'shared-voice').hidden = !shared),
     microphone(state) {
@@ -93,12 +97,16 @@ export function makePage(
     silenced: (silent) => (byId(root, 'silenced').hidden = !silent),
     queued: (place) => overlay.queue(place),
     connected(resumed) {
+      isNew = !resumed;
       transcript.record.begin(resumed);
       if (!overlay.isShown) return;
       overlay.hide();
       controls.focus();
     },
-    ended: (ending) => overlay.end(ending, () => again()),
+    ended(ending) {
+      if (ending.again && ending.wait === null) transcript.close(); // it goes on with a click alone, of anybody
+      overlay.end(ending, () => again());
+    },
   };
   const talk = (conversation: Conversation) => {
     byId(root, 'state-line').hidden = false;

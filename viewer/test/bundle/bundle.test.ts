@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
+import { identityOf } from '../../src/bundle/load.ts';
 import { blinkIndices, checkManifest } from '../../src/bundle/manifest.ts';
 import { parseSafetensors } from '../../src/bundle/safetensors.ts';
 import { readBakedHead } from '../../src/bundle/baked-head.ts';
@@ -40,6 +41,19 @@ describe('a bundle that Python wrote', () => {
     for (const wrong of [null, { ...written.provenance, likeness: 3 }, { ...written.provenance, sources: 'me.mp4' }, { ...written.provenance, voice: { recording: 'me.mp4' } }]) {
       expect(() => checkManifest({ ...written, provenance: wrong })).toThrow(/manifest\.json: provenance\.[\w.]+ is missing or not/);
     }
+  });
+
+  test('is told from another person, and from itself in another part', () => {
+    const { persona, files } = manifest;
+    const others = [
+      { ...manifest, name: 'another' },
+      { ...manifest, persona: { ...persona, name: 'Ada' } },
+      { ...manifest, persona: { ...persona, greeting: 'Welcome to the museum.' } },
+      { ...manifest, files: { ...files, 'head.safetensors': { size: 1, sha256: '0' } } },
+    ];
+    const identities = [manifest, ...others].map(identityOf);
+    expect(new Set(identities).size).toBe(identities.length);
+    expect(identityOf(checkManifest(JSON.parse(read('manifest.json').toString())))).toBe(identities[0]);
   });
 
   test('eyelids lie behind the five brow values', () => {

@@ -1,5 +1,7 @@
-import { expect, test } from 'vitest';
-import { RunningSentence } from '../../src/talk/record.ts';
+import { expect, test, vi } from 'vitest';
+import { RunningSentence, TalkRecord, type Entry } from '../../src/talk/record.ts';
+
+const line = (text: string): Entry => ({ who: 'you', at: new Date(), text, cut: false });
 
 /** What is read while clauses are spoken: [utterance, first sample, text, units heard]. */
 function read(...clauses: [number, number, string, number][]): string[] {
@@ -36,4 +38,39 @@ test('a new sentence begins anew, and so does another answer', () => {
 
 test('scripts without spaces get none', () => {
   expect(read([0, 0, '你好，', 3], [0, 9, '我是艾丽丝。', 2])).toEqual(['你好，|', '你好，我是|艾丽丝。']);
+});
+
+test('a talk is earlier than the next one; of one in which the visitor said nothing no line stays', () => {
+  const record = new TalkRecord({ changed: () => {}, renewed: () => {} }, [line('before')]);
+  const texts = () => [record.earlier, record.entries, record.lasting].map((lines) => lines.map(({ text }) => text));
+  const greet = () => record.heard({ utterance: 0, first: 0, text: 'Hello.', heard: 6 });
+  record.begin(false);
+  greet();
+  expect(texts()).toEqual([['before'], ['Hello.'], ['before']]);
+  record.begin(false);
+  greet();
+  record.asked('Who?');
+  expect(texts()).toEqual([['before'], ['Hello.', 'Who?'], ['before', 'Hello.', 'Who?']]);
+  record.begin(true);
+  expect(texts()[1]).toEqual(['Hello.', 'Who?']);
+  record.begin(false);
+  expect(texts()).toEqual([['before', 'Hello.', 'Who?'], [], ['before', 'Hello.', 'Who?']]);
+});
+
+test('after the server has ended a talk nothing of it stays, nor after it was cleared', () => {
+  const renewed = vi.fn();
+  const record = new TalkRecord({ changed: () => {}, renewed }, [line('before')]);
+  record.begin(false);
+  record.asked('Who?');
+  record.close();
+  expect([record.lasting.length, record.entries.length]).toEqual([0, 1]); // it can still be read
+  record.begin(false);
+  expect([record.earlier, record.entries]).toEqual([[], []]);
+  record.asked('And who are you?');
+  record.heard({ utterance: 1, first: 0, text: 'I am Ada.', heard: 4 });
+  record.clear();
+  expect([record.earlier, record.entries, renewed.mock.calls.length]).toEqual([[], [], 3]);
+  record.heard({ utterance: 1, first: 0, text: 'I am Ada.', heard: 9 }); // what is still being said
+  record.asked('Still there?');
+  expect(record.lasting.map(({ text }) => text)).toEqual(['I am Ada.', 'Still there?']);
 });

@@ -30,12 +30,15 @@ export class Memory {
    *
    * @param offered whether the avatar remembers visitors
    * @param tell tells it what was said in earlier visits
+   * @returns whether it knows something of them
    */
-  offer(offered: boolean, tell: (texts: readonly string[]) => void): void {
+  offer(offered: boolean, tell: (texts: readonly string[]) => void): boolean {
     this.offered = offered;
     this.draw();
     const { notes } = this.notebook;
-    if (offered && notes.length > 0) tell(notes);
+    const recalls = offered && notes.length > 0;
+    if (recalls) tell(notes);
+    return recalls;
   }
 
   /** The visitor has said something. */

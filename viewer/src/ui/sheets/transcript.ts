@@ -1,14 +1,15 @@
 import type { Progress } from '../../talk/captioning.ts';
 import { TalkRecord, type Entry } from '../../talk/record.ts';
 import type { PageWords } from '../../words/page-words.ts';
-import { say } from '../../words/text.ts';
+import { say, type Sentence } from '../../words/text.ts';
 import { copyText, saveText } from './clipboard.ts';
 import { Disclosure } from './disclosure.ts';
+import { KeptTalk, keepUp } from './kept-talk.ts';
 import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
 import { isForOthers } from '../keys.ts';
 
-const TOLD = 3000; // ms for which it says that it has copied
+const TOLD = 3000; // ms for which it says what a button has done
 const END = 40; // pixels from the lower end within which the record follows what is said
 
 /** Who talks. */
@@ -18,9 +19,11 @@ export interface Talker {
   languages: readonly string[];
   /** Address of its server. */
   home: string;
+  /** What tells it from other avatars in the lines that the tab keeps; null where no line is kept. */
+  kept: string | null;
 }
 
-/** The drawer with all that was said, and what screen readers hear of it. */
+/** The drawer with all that was said, and what screen readers hear of it; where the tab keeps it, also before a reload. */
 export class Transcript {
   readonly record: TalkRecord;
   private readonly page: HTMLElement;
@@ -28,15 +31,23 @@ export class Transcript {
   private readonly talker: Talker;
   private readonly list: HTMLElement;
   private readonly rows = new Map<Entry, HTMLElement>();
-  private began: Date | null = null; // the talk, after another one
+  private began = new Date(); // the talk
+  private recalls = false; // the avatar was told what the visitor said in earlier ones
   private announced = 0; // entries that screen readers have heard
+  private readonly kept: KeptTalk | null;
+  private readonly keep: () => void;
 
   constructor(page: HTMLElement, words: PageWords, talker: Talker, signal: AbortSignal) {
     this.page = page;
     this.words = words;
     this.talker = talker;
     this.list = byId(page, 'record');
-    this.record = new TalkRecord({ changed: (entry) => this.changed(entry), cleared: () => this.cleared() });
+    this.kept = talker.kept === null ? null : new KeptTalk(talker.home, talker.kept);
+    const events = { changed: (entry: Entry) => this.changed(entry), renewed: () => this.renewed() };
+    this.record = new TalkRecord(events, this.kept?.read());
+    this.keep = this.kept ? keepUp(this.kept, () => this.record.lasting, signal) : () => {};
+    byId(page, 'drawer-kept').hidden = this.kept === null;
+    byId(page, 'drawer-clear').onclick = () => this.clear();
     byId(page, 'drawer-copy').onclick = () => void this.copy();
     byId(page, 'drawer-save').onclick = () => saveText(this.text(), this.fileName());
     words.onChange(() => this.draw(), signal);
@@ -55,6 +66,19 @@ export class Transcript {
 
   heard(progress: Progress): void {
     this.record.heard(progress);
+  }
+
+  /** The server has ended the talk: its lines stay until the next one begins, which may be somebody else's. */
+  close(): void {
+    this.record.close();
+    this.kept?.write([]);
+  }
+
+  /** Says of earlier talks whether the avatar was told what the visitor said in them. */
+  showRecall(recalls: boolean): void {
+    if (recalls === this.recalls) return;
+    this.recalls = recalls;
+    this.draw();
   }
 
   /**
@@ -76,8 +100,14 @@ export class Transcript {
     this.list.focus({ preventScroll: true });
   }
 
-  private cleared(): void {
-    if (this.rows.size > 0) this.began = new Date();
+  private clear(): void {
+    this.record.clear();
+    this.kept?.write([]);
+    this.tell(say('transcript.cleared'));
+  }
+
+  private renewed(): void {
+    this.began = new Date();
     this.announced = 0;
     byId(this.page, 'announcer').replaceChildren();
     this.draw();
@@ -85,14 +115,18 @@ export class Transcript {
 
   private draw(): void {
     this.rows.clear();
-    this.list.replaceChildren();
-    const { entries } = this.record;
-    if (this.began) this.list.append(this.divider(this.began));
-    else if (entries.length === 0) this.list.append(this.note());
-    for (const entry of entries) this.changed(entry);
+    const { earlier, entries } = this.record;
+    const before = [this.divider(this.aboutEarlier()), ...earlier.map((entry) => this.row(entry)), this.divider(this.aboutNow())];
+    this.list.replaceChildren(...(earlier.length > 0 ? before : entries.length === 0 ? [this.note()] : []));
+    for (const entry of entries) this.show(entry);
   }
 
   private changed(entry: Entry): void {
+    this.show(entry);
+    this.keep();
+  }
+
+  private show(entry: Entry): void {
     const { list } = this;
     const follows = list.scrollHeight - list.scrollTop - list.clientHeight < END;
     const row = this.rows.get(entry) ?? this.add(entry);
@@ -101,6 +135,14 @@ export class Transcript {
   }
 
   private add(entry: Entry): HTMLElement {
+    const row = this.row(entry);
+    if (this.rows.size === 0 && this.record.earlier.length === 0) this.list.replaceChildren();
+    this.list.append(row);
+    this.rows.set(entry, row);
+    return row;
+  }
+
+  private row(entry: Entry): HTMLElement {
     const row = document.createElement('div');
     row.className = entry.who;
     const who = document.createElement('strong');
@@ -110,16 +152,24 @@ export class Transcript {
     time.textContent = this.clock(entry.at);
     row.append(who, ' ', time, this.paragraph(entry.text));
     (row.lastElementChild as HTMLElement).lang = this.talker.languages[0] ?? '';
-    if (this.rows.size === 0 && !this.began) this.list.replaceChildren();
-    this.list.append(row);
-    this.rows.set(entry, row);
     return row;
   }
 
-  private divider(at: Date): HTMLElement {
-    const line = this.paragraph(`${this.words.text(say('transcript.new'))} · ${this.clock(at)}`);
+  private divider(text: string): HTMLElement {
+    const line = this.paragraph(text);
     line.className = 'divider';
     return line;
+  }
+
+  /** What stands over talks before this one. */
+  private aboutEarlier(): string {
+    const { name } = this.talker;
+    return this.words.text(this.recalls ? say('transcript.earlier') : say('transcript.forgotten', { name }));
+  }
+
+  /** What stands over this talk, after others. */
+  private aboutNow(): string {
+    return `${this.words.text(say('transcript.new'))} · ${this.clock(this.began)}`;
   }
 
   private note(): HTMLElement {
@@ -142,26 +192,35 @@ export class Transcript {
     return this.words.text(say('transcript.said', { who: this.nameOf(entry), text: entry.text }));
   }
 
+  /** The time of a day; of another day than this one, with it. */
   private clock(at: Date): string {
-    return at.toLocaleTimeString(this.words.language, { timeStyle: 'short' });
+    const isToday = at.toDateString() === new Date().toDateString();
+    return at.toLocaleString(this.words.language, { timeStyle: 'short', dateStyle: isToday ? undefined : 'short' });
   }
 
-  /** The talk as a text: its title, and a line for each time that somebody spoke. */
+  /** All as a text: its title, and a line for each time that somebody spoke. */
   private text(): string {
-    const { entries } = this.record;
-    const day = (entries[0]?.at ?? new Date()).toLocaleDateString(this.words.language, { dateStyle: 'long' });
-    return [`${this.talker.name}, ${day}`, '', ...entries.map((entry) => `[${this.clock(entry.at)}] ${this.line(entry)}`), ''].join('\n');
+    const { earlier, entries } = this.record;
+    const written = (lines: readonly Entry[]) => lines.map((entry) => `[${this.clock(entry.at)}] ${this.line(entry)}`);
+    const before = earlier.length > 0 ? [this.aboutEarlier(), ...written(earlier), '', this.aboutNow()] : [];
+    const day = this.began.toLocaleDateString(this.words.language, { dateStyle: 'long' });
+    return [`${this.talker.name}, ${day}`, '', ...before, ...written(entries), ''].join('\n');
   }
 
   private fileName(): string {
-    const day = (this.record.entries[0]?.at ?? new Date()).toLocaleDateString('sv'); // 2026-01-31
+    const day = this.began.toLocaleDateString('sv'); // 2026-01-31
     return `${this.talker.name} ${this.words.text(say('transcript.file'))} ${day}.txt`.replace(/[/\\:*?"<>|]/g, '-');
   }
 
   private async copy(): Promise<void> {
     const copied = await copyText(this.text(), byId(this.page, 'drawer'));
+    this.tell(say(copied ? 'transcript.copied' : 'transcript.uncopied'));
+  }
+
+  /** Says for some seconds what a button has done. */
+  private tell(sentence: Sentence): void {
     const told = byId(this.page, 'drawer-told');
-    this.words.write(told, say(copied ? 'transcript.copied' : 'transcript.uncopied'));
+    this.words.write(told, sentence);
     setTimeout(() => this.words.write(told, ''), TOLD);
   }
 }
