@@ -18,7 +18,7 @@ import { addTexts, say, type Sentence } from '../words/text.ts';
 import { MakingView } from './making.ts';
 import { Place } from './place.ts';
 import { Recordings, Refusal, type Overview, type Status } from './recordings.ts';
-import { Room } from './room.ts';
+import { Room } from './room/room.ts';
 
 const KEY = 'studio-key'; // under which the tab keeps it: who comes back from the talk does not bring it
 const UNADMITTED = 401;

@@ -1,6 +1,5 @@
 import { expect, test } from 'vitest';
 import { likenessOf } from '../../src/studio/making.ts';
-import { qualityOf } from '../../src/studio/room.ts';
 import studio from '../../src/words/studio.json';
 import { addTexts, LANGUAGES, textOf, type Language } from '../../src/words/text.ts';
 
@@ -21,11 +20,4 @@ test('the levels differ in each language', () => {
     const words = [20, 26, 30].map((decibels) => textOf(likenessOf(decibels), language).replace(/\d+/, ''));
     expect(new Set(words).size, language).toBe(3);
   }
-});
-
-test('a quality says how long it takes, where that is known', () => {
-  expect(textOf(qualityOf('quick'), 'en')).toBe('quick, for a first impression');
-  expect(textOf(qualityOf('quick', 560), 'en')).toBe('quick, for a first impression (about 9 min)');
-  expect(textOf(qualityOf('good', 3), 'de')).toBe('gut (etwa 1 min)');
-  expect(textOf(qualityOf('best', 5400), 'ja')).toBe('最高（時間が最もかかる）、約90分');
 });

@@ -1,25 +1,24 @@
-import { every } from '../lifetime.ts';
-import { byId } from '../ui/elements.ts';
-import { isKey, say, type Key, type Sentence } from '../words/text.ts';
-import { showAdvice } from './advice.ts';
+import { every } from '../../lifetime.ts';
+import { byId } from '../../ui/elements.ts';
+import { say, type Key } from '../../words/text.ts';
+import { showAdvice } from '../advice.ts';
+import { Bodies, type BodyPorts } from '../bodies.ts';
+import type { Overview, Part, Status } from '../recordings.ts';
 import { Camera } from './camera.ts';
-import { Bodies, type BodyPorts } from './bodies.ts';
+import { Guide } from './guide.ts';
+import { MakeForm, type MakePorts } from './make-form.ts';
 import { showMeters, soundsOf } from './meters.ts';
 import { isAgreed, showParts, UPLOAD } from './parts.ts';
-import type { Overview, Part, Status, Told, Turns } from './recordings.ts';
+import { isBrought, isComplete, isEnough, mayChoose, nextPart } from './readiness.ts';
 import { Sending } from './sending.ts';
 
-const LOOKED = 400; // ms between two pictures for guidance
 const SHOWN = 250; // ms between two of the clock's
 const LONGEST = 60; // s of a part, after which it stops by itself
-const SLICE = 4 << 20; // bytes of a video that are sent at once
 
 /** What the view of a person's recording needs of the page around it. */
-export interface RoomPorts extends BodyPorts {
+export interface RoomPorts extends BodyPorts, MakePorts {
   /** A part is chosen. */
   chosen(part: string): void;
-  /** Asks a question that is answered by yes or no. */
-  confirm(question: Sentence): boolean;
 }
 
 /** Where somebody records the parts, brings a video, and has the avatar made. */
@@ -27,20 +26,22 @@ export class Room {
   private readonly root: ParentNode;
   private readonly ports: RoomPorts;
   private readonly camera: Camera;
+  private readonly guide: Guide;
   private readonly bodies: Bodies;
+  private readonly form: MakeForm;
   private status: Status | null = null;
   private current = '';
   private sending: Sending | null = null;
   private saving = false; // a part has ended, and the server looks at it
   private began = 0; // ms, of the recording
-  private looking = false;
-  private most = 0; // of the turn that is being recorded, 0 to 1
 
   constructor(root: ParentNode, ports: RoomPorts, signal: AbortSignal) {
     this.root = root;
     this.ports = ports;
     this.camera = new Camera(byId<HTMLVideoElement>(root, 'camera'), () => this.loseCamera());
+    this.guide = new Guide(root, ports, this.camera, () => this.status && { name: this.status.name, part: this.current }, signal);
     this.bodies = new Bodies(root, ports);
+    this.form = new MakeForm(root, ports, (status) => this.beginMaking(status));
     this.on('open', () => this.open());
     this.on('record', () => (this.camera.isRecording ? this.finish() : this.begin()));
     this.on('salvage', () => this.change((name, { id, take }) => ports.recordings.keep(name, id, take!)));
@@ -52,32 +53,14 @@ export class Room {
     this.on('upload', async () => byId(root, 'file').click());
     byId<HTMLDialogElement>(root, 'shown').onclose = () => byId<HTMLVideoElement>(root, 'replay').removeAttribute('src');
     byId<HTMLInputElement>(root, 'file').onchange = () => void this.upload().catch(ports.failed);
-    byId<HTMLFormElement>(root, 'make').onsubmit = (event) => {
-      event.preventDefault();
-      this.make();
-    };
-    byId<HTMLSelectElement>(root, 'quality').onchange = () => this.write();
-    every(LOOKED, signal, () => void this.look().catch(() => {}));
     every(SHOWN, signal, () => this.showClock());
   }
 
   /** What the server can do. */
   equip(overview: Overview): void {
-    const { qualities, lacking } = overview;
     this.bodies.equip(overview);
-    byId(this.root, 'lacking').hidden = lacking === '';
-    const options = qualities.map((quality) => {
-      const option = new Option(quality, quality, quality === 'good', quality === 'good');
-      this.ports.words.write(option, qualityOf(quality));
-      return option;
-    });
-    byId(this.root, 'quality').replaceChildren(...options);
-  }
-
-  /** Says of each quality how long it takes, if that is known. */
-  private writeQualities({ durations }: Status): void {
-    const { options } = byId<HTMLSelectElement>(this.root, 'quality');
-    for (const option of options) this.ports.words.write(option, qualityOf(option.value, durations[option.value]));
+    this.form.equip(overview.qualities);
+    byId(this.root, 'lacking').hidden = overview.lacking === '';
   }
 
   /**
@@ -90,7 +73,7 @@ export class Room {
     this.status = status;
     byId(this.root, 'text').lang = status.language;
     if (other) this.showFirst(status, part);
-    else if (this.current === UPLOAD && !this.isBrought) this.current = this.next(status);
+    else if (this.current === UPLOAD && !isBrought(status)) this.current = nextPart(status);
     this.bodies.show(status);
     this.write();
   }
@@ -101,10 +84,8 @@ export class Room {
   }
 
   private showFirst(status: Status, part: string | null): void {
-    const { making } = status;
-    if (making) byId<HTMLSelectElement>(this.root, 'quality').value = making.quality;
-    const isThere = status.parts.some(({ id, state }) => id === part && (this.isAgreed || id === 'consent') && (id !== UPLOAD || state === 'kept'));
-    this.current = isThere ? part! : this.isBrought ? UPLOAD : this.next(status);
+    if (status.making) this.form.choose(status.making.quality);
+    this.current = mayChoose(status, part) ? part : isBrought(status) ? UPLOAD : nextPart(status);
   }
 
   /** Leaves the person; the camera goes off, and of a part that is being recorded stays what was sent. */
@@ -118,14 +99,8 @@ export class Room {
     return this.status?.parts.find(({ id }) => id === this.current);
   }
 
-  /** The part after the current one that was not recorded yet; the current one if all were. */
-  private next({ parts }: Status): string {
-    const open = parts.filter(({ id, state }) => id !== UPLOAD && state !== 'kept'); // consent is the first of all
-    return (open[0] ?? parts[0]!).id;
-  }
-
   private advance(): void {
-    this.select(this.next(this.status!));
+    this.select(nextPart(this.status!));
   }
 
   private on(id: string, act: () => Promise<void>): void {
@@ -135,7 +110,7 @@ export class Room {
   private async open(): Promise<void> {
     this.ports.problem(null);
     await this.camera.open();
-    this.hush();
+    this.guide.hush();
     this.write();
   }
 
@@ -143,7 +118,8 @@ export class Room {
     this.ports.problem(null);
     const { name } = this.status!;
     this.sending = new Sending(this.ports.recordings, name, this.current, (lost) => this.ports.problem(lost ? say('studio.lost') : null));
-    [this.began, this.most] = [performance.now(), 0];
+    this.began = performance.now();
+    this.guide.begin();
     this.camera.record(this.sending, (error) => void this.breakOff(error).catch(this.ports.failed));
     this.write();
   }
@@ -217,10 +193,7 @@ export class Room {
     problem(null);
     arrived.hidden = false;
     try {
-      for (let at = 0; at < file.size; at += SLICE) {
-        words.write(arrived, say('studio.uploading', { n: Math.floor((100 * at) / file.size) }));
-        await sending.add(file.slice(at, at + SLICE));
-      }
+      await sending.addVideo(file, (percent) => words.write(arrived, say('studio.uploading', { n: percent })));
       words.write(arrived, say('studio.looking'));
       const status = await sending.keep();
       this.current = UPLOAD; // what is wrong with it is read at once
@@ -234,25 +207,20 @@ export class Room {
 
   /** Has the avatar made; where a making was stopped or failed, from nothing. */
   make(): void {
-    const anew = isOver(this.status!);
-    if (anew && !this.ports.confirm(say('studio.making.anew.sure'))) return;
-    this.ports.problem(null);
-    this.ports.recordings.make(this.status!.name, this.quality, anew).then((status) => {
-      this.camera.close();
-      this.ports.changed(status);
-    }, this.ports.failed);
+    this.form.make();
   }
 
-  private get quality(): string {
-    return byId<HTMLSelectElement>(this.root, 'quality').value;
+  private beginMaking(status: Status): void {
+    this.camera.close();
+    this.ports.changed(status);
   }
 
   private select(id: string): void {
     if (this.camera.isRecording || this.saving) return;
     this.current = id;
     this.ports.chosen(id);
-    this.most = 0;
-    this.hush();
+    this.guide.begin();
+    this.guide.hush();
     this.write();
     this.reveal();
   }
@@ -260,37 +228,6 @@ export class Room {
   /** Scrolls to what the current part asks, if it is not seen. */
   private reveal(): void {
     this.root.querySelector('.set')!.scrollIntoView({ block: 'nearest' });
-  }
-
-  /** Says nothing of pictures that are past; instead, if anything, that there are none. */
-  private hush(instead?: Key): void {
-    const guide = byId(this.root, 'guide');
-    this.ports.words.write(guide, instead ? say(instead) : '');
-    delete guide.dataset.word;
-  }
-
-  private async look(): Promise<void> {
-    if (this.looking || !this.status || document.hidden) return;
-    this.looking = true;
-    try {
-      const picture = await this.camera.picture();
-      if (picture && this.status) this.tell(await this.ports.recordings.look(this.status.name, this.current, picture));
-    } finally {
-      this.looking = false;
-    }
-  }
-
-  private tell({ word, turned }: Told): void {
-    const wanted = turned?.[this.current as keyof Turns];
-    this.most = Math.max(this.camera.isRecording ? this.most : 0, wanted ?? 0);
-    const isEnough = this.camera.isRecording && this.most >= 1 && (word === this.current || word === 'good');
-    const key = `studio.guide.${isEnough ? 'enough' : word}`;
-    const guide = byId(this.root, 'guide');
-    this.ports.words.write(guide, isKey(key) && this.camera.isOpen ? say(key) : '');
-    guide.dataset.word = isEnough ? 'good' : word;
-    const reached = byId<HTMLProgressElement>(this.root, 'reached');
-    reached.hidden = wanted === undefined;
-    reached.value = this.most;
   }
 
   private showClock(): void {
@@ -316,19 +253,18 @@ export class Room {
     byId(root, 'open').hidden = camera.isOpen || part.id === UPLOAD;
     byId(root, 'view').hidden = part.id === UPLOAD;
     byId(root, 'salvage').hidden = camera.isRecording || part.state !== 'broken';
-    byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || this.isComplete(status);
-    byId(root, 'onward').hidden = camera.isRecording || !this.isEnough(status);
+    byId(root, 'next').hidden = camera.isRecording || part.state !== 'kept' || isComplete(status);
+    byId(root, 'onward').hidden = camera.isRecording || !isEnough(status);
     byId(root, 'play').hidden = byId(root, 'remove').hidden = camera.isRecording || part.state === 'missing';
     for (const id of ['record', 'salvage', 'remove', 'upload']) byId<HTMLButtonElement>(root, id).disabled = this.saving;
     showAdvice(byId(root, 'advice'), words, part.advice ?? []);
     showParts(byId(root, 'parts'), words, status.parts, this.current, (id) => this.select(id));
     this.measure(0);
     words.write(byId(root, 'sounds'), soundsOf(status.covered));
-    byId(root, 'covered').hidden = this.isBrought; // the parts do not count then
-    this.writeMake(status);
-    byId<HTMLButtonElement>(root, 'upload').disabled ||= !this.isAgreed;
-    if (!camera.isOpen) this.hush('studio.camera.off');
-    byId(root, 'reached').hidden ||= !camera.isOpen;
+    byId(root, 'covered').hidden = isBrought(status); // the parts do not count then
+    this.form.show(status, camera.isRecording || this.saving);
+    byId<HTMLButtonElement>(root, 'upload').disabled ||= !isAgreed(status.parts);
+    this.guide.show();
   }
 
   /** Shows what is covered, with so many seconds of what is being recorded. */
@@ -337,60 +273,4 @@ export class Room {
     const now = this.camera.isRecording ? { part: this.current, seconds } : null;
     showMeters(byId(this.root, 'meters'), this.ports.words, this.status, now);
   }
-
-  /** Shows whether the avatar can be made, and what the button does. */
-  private writeMake(status: Status): void {
-    const { words } = this.ports;
-    this.writeQualities(status);
-    const ready = this.isReady(status);
-    const { making } = status;
-    const isSame = making?.state === 'made' && making.changed.length === 0 && making.quality === this.quality;
-    const go = byId<HTMLButtonElement>(this.root, 'go');
-    go.disabled = !ready || isSame || this.camera.isRecording || this.saving;
-    words.write(go, say(isOver(status) ? 'studio.making.anew' : making || status.avatar ? 'studio.make.again' : 'studio.make'));
-    words.write(byId(this.root, 'first'), isSame ? say('studio.make.same') : ready ? this.more(status) : say('studio.make.first'));
-  }
-
-  /** Whether the person said that they agree: that comes before all else. */
-  private get isAgreed(): boolean {
-    return isAgreed(this.status!.parts);
-  }
-
-  private isReady({ parts }: Status): boolean {
-    return this.isAgreed && parts.filter(({ state }) => state === 'kept').length > 1;
-  }
-
-  /** Whether there is a video that takes the place of the parts. */
-  private get isBrought(): boolean {
-    return this.status!.parts.some(({ id, state }) => id === UPLOAD && state === 'kept');
-  }
-
-  /** What is said of an avatar that could be made: that more would be better, as long as it would. */
-  private more(status: Status): Sentence {
-    return this.isEnough(status) ? '' : say('studio.make.more');
-  }
-
-  /** Whether an avatar can be made that would hardly be better of more. */
-  private isEnough(status: Status): boolean {
-    return this.isReady(status) && (this.isBrought || status.covered.seconds >= status.covered.enough);
-  }
-
-  private isComplete({ parts }: Status): boolean {
-    return parts.every(({ id, state }) => id === UPLOAD || state === 'kept');
-  }
-}
-
-/**
- * What a quality is called.
- *
- * @param seconds that it takes, if anybody knows
- */
-export function qualityOf(quality: string, seconds?: number): Sentence {
-  const name = say(`studio.quality.${quality}` as Key);
-  return seconds === undefined ? name : say('studio.quality.time', { quality: name, n: Math.max(Math.round(seconds / 60), 1) });
-}
-
-/** Whether a making has ended without an avatar. */
-function isOver({ making }: Status): boolean {
-  return making?.state === 'stopped' || making?.state === 'failed';
 }

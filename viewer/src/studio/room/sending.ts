@@ -1,6 +1,7 @@
-import { Refusal, type Recordings, type Status } from './recordings.ts';
+import { Refusal, type Recordings, type Status } from '../recordings.ts';
 
 const AGAIN = 1000; // ms after which an unanswered request is made once more
+const SLICE = 4 << 20; // bytes of a video that are sent at once
 const HEAD = 16; // bytes by which the server knows a video: browsers begin some with a piece of a single byte
 
 /** Sends a part to the server piece by piece, in order; what is not taken stays here until it is. */
@@ -27,6 +28,14 @@ export class Sending {
     this.queue = this.queue.then(() => this.send(piece));
     this.queue.catch(() => {}); // heard of where it is waited for
     return this.queue;
+  }
+
+  /** Sends a video, slice by slice. */
+  async addVideo(video: Blob, tell: (percent: number) => void): Promise<void> {
+    for (let at = 0; at < video.size; at += SLICE) {
+      tell(Math.floor((100 * at) / video.size));
+      await this.add(video.slice(at, at + SLICE));
+    }
   }
 
   /** Waits until everything has arrived, and lets it be the part. */

@@ -1,5 +1,5 @@
-import { PageError } from '../errors.ts';
-import { say, type Key } from '../words/text.ts';
+import { PageError } from '../../errors.ts';
+import { say, type Key } from '../../words/text.ts';
 import type { Sending } from './sending.ts';
 
 const PIECE = 500; // ms of a part that are sent at once: what a closed page loses at most

@@ -1,8 +1,8 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import { Refusal, type Recordings, type Status } from '../../src/studio/recordings.ts';
-import { Sending } from '../../src/studio/sending.ts';
-import studio from '../../src/words/studio.json';
-import { addTexts, codeOf } from '../../src/words/text.ts';
+import { Refusal, type Recordings, type Status } from '../../../src/studio/recordings.ts';
+import { Sending } from '../../../src/studio/room/sending.ts';
+import studio from '../../../src/words/studio.json';
+import { addTexts, codeOf } from '../../../src/words/text.ts';
 
 /** A server that takes pieces, and answers as it is told. */
 class Taking {
@@ -85,4 +85,17 @@ test('a refusal is said in the words of the page, where it has some', () => {
   expect(codeOf(new Refusal(507, 'full', 'x').sentence)).toBe('studio.refused.full');
   expect(codeOf(NO_ANSWER.sentence)).toBe('studio.lost');
   expect(new Refusal(500, '', 'all is gone but x.').message).toBe('all is gone but x.');
+});
+
+test('a video goes slice by slice, and is told how much of it has gone', async () => {
+  const sizes: [number, number][] = [];
+  server.append = async (_name, _part, _take, offset, { size }) => {
+    sizes.push([offset, size]);
+    return { size: offset + size };
+  };
+  const told: number[] = [];
+  const [slice, size] = [4 << 20, 9 << 20];
+  await sending.addVideo(new Blob([new Uint8Array(size)]), (percent) => told.push(percent));
+  expect(sizes).toEqual([[0, slice], [slice, slice], [2 * slice, size - 2 * slice]]);
+  expect(told).toEqual([0, 44, 88]);
 });

@@ -1,6 +1,6 @@
-import type { PageWords } from '../words/page-words.ts';
-import { say } from '../words/text.ts';
-import { partName, type Part } from './recordings.ts';
+import type { PageWords } from '../../words/page-words.ts';
+import { say } from '../../words/text.ts';
+import { partName, type Part } from '../recordings.ts';
 
 /** The part that is a video which somebody brought instead of recording. */
 export const UPLOAD = 'upload';

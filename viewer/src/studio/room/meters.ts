@@ -1,6 +1,6 @@
-import type { PageWords } from '../words/page-words.ts';
-import { say, type Sentence } from '../words/text.ts';
-import { TURNS, type Status } from './recordings.ts';
+import type { PageWords } from '../../words/page-words.ts';
+import { say, type Sentence } from '../../words/text.ts';
+import { TURNS, type Status } from '../recordings.ts';
 
 const TEXT = 8; // s after which the meter shows a text that is being read as read
 
