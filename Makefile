@@ -16,8 +16,8 @@ demo-natural: $(VENV)/.serve src/ico3d/chat/static/index.html ## the same with W
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
-	$(MAKE) --no-print-directory -j 3 e2e-alone $(VENV)/.kernels page strict lint # all but the first give way
-	$(MAKE) --no-print-directory -j 2 unit e2e-beside # browsers mostly wait for speech
+	$(MAKE) --no-print-directory -j 3 e2e-alone $(VENV)/.kernels page # all but the first give way
+	$(MAKE) --no-print-directory -j 4 unit e2e-beside strict lint # browsers mostly wait for speech; checks take what is left
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
 	ruff check . && ruff format --check .
