@@ -1,6 +1,8 @@
 """The head model: shapes, the paper's equations, files."""
 
 import math
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -187,3 +189,14 @@ def test_harmonics_follow_a_change_of_light():
     expected = before[:, 4:] * slope.repeat(1, 3)
     torch.testing.assert_close(after[:, 4:], expected, rtol=1e-4, atol=1e-6)
     torch.testing.assert_close(after[:, 3], before[:, 3], rtol=1e-6, atol=1e-6)
+
+
+def test_a_head_is_loaded_without_what_takes_seconds_to_import(tmp_path):
+    """Comparing shapes on torch's device without memory must not call for sympy."""
+    HeadModel(head_shape(3), 5).save(tmp_path / "head.safetensors")
+    program = (
+        "import sys\nfrom pathlib import Path\nfrom ico3d.head.model import HeadModel\n"
+        f"HeadModel.load(Path({str(tmp_path / 'head.safetensors')!r}))\n"
+        "sys.exit('sympy' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 0

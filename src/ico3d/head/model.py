@@ -121,7 +121,9 @@ class HeadModel(nn.Module):
         self.shape = shape
         count = num_gaussians
         self.means = nn.Parameter(torch.zeros(count, 3))
-        self.quats = nn.Parameter(torch.tensor([1.0, 0, 0, 0]).repeat(count, 1))
+        # `repeat` would import sympy, for seconds, where shapes alone are asked for (`check_shapes`)
+        self.quats = nn.Parameter(torch.zeros(count, 4))
+        self.quats.data[:, 0] = 1.0
         self.log_scales = nn.Parameter(torch.full((count, 3), -5.0))
         self.basis = nn.Parameter(torch.zeros(shape.rows, count, shape.width))
         if shape.relit:
