@@ -121,7 +121,7 @@ class HeadModel(nn.Module):
         self.shape = shape
         count = num_gaussians
         self.means = nn.Parameter(torch.zeros(count, 3))
-        # `repeat` would import sympy, for seconds, where shapes alone are asked for (`check_shapes`)
+        # `repeat` would import sympy, which takes seconds, where shapes alone are wanted
         self.quats = nn.Parameter(torch.zeros(count, 4))
         self.quats.data[:, 0] = 1.0
         self.log_scales = nn.Parameter(torch.full((count, 3), -5.0))
