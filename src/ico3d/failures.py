@@ -7,6 +7,7 @@ A terminal shows each sentence amid what matters there alone, such as the name o
 FAILURES: dict[str, str] = {
     "busy": "the avatar is being made just now, by another process.",
     "checkpoint": "all checkpoints of the training are damaged: it cannot go on from there.",
+    "costly": "reading the video takes more time or memory than is given to it: convert it to MP4.",
     "decoding": "the file cannot be decoded as a video; is it damaged?",
     "disk-full": "the disk is full: free some space.",
     "disk-room": "the disk has {free} GB left and {needed} GB are needed: free some space.",

@@ -12,6 +12,7 @@ from ico3d.capture.capture import Sound
 from ico3d.capture.decoding import check_size
 from ico3d.capture.sound import check_claim, joined
 from ico3d.capture.vetting.promises import MOST_TRACKS, check_promises
+from ico3d.capture.vetting.rehearsal import rehearse
 from ico3d.common.sound import RECORDING, Claim
 from ico3d.errors import CaptureError
 
@@ -133,7 +134,7 @@ def opened(path: Path) -> Any:
 
     Raises:
         CaptureError: If the file states larger pictures than are taken (`decoding.check_size`), or
-            promises more than it can hold (`check_promises`).
+            promises more than it can hold (`check_promises`), or costs too much (`rehearse`).
         FFmpegError: If it is no video, or is a play list.
         OSError: If it cannot be read.
     """
@@ -144,9 +145,9 @@ def opened(path: Path) -> Any:
     bounds["max_streams"] = str(MOST_TRACKS)  # FFmpeg begins to decode each
     # pictures are decoded while a file is opened, of every stream
     pixels = {"max_pixels": str(decoding.MOST_PIXELS)}
-    container = av.open(
-        str(path), metadata_errors="replace", container_options=bounds, options=pixels
-    )
+    how = {"metadata_errors": "replace", "container_options": bounds, "options": pixels}
+    rehearse(path, how)
+    container = av.open(str(path), **how)
     try:
         for stream in container.streams.video:
             if stream.codec_context is not None:

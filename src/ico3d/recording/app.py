@@ -193,7 +193,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         try:
             report = await asyncio.to_thread(room.eye.report, file, id)
         except Refused as error:
-            if error.code in ("no-video", "unusable"):
+            if error.code in ("no-video", "costly", "unusable"):
                 person.discard(id, take)
             raise
         async with room.lock(name):

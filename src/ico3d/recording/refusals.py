@@ -40,6 +40,12 @@ def no_video() -> Refused:
     return Refused("no-video", "this file is no video: choose an MP4, MOV, WebM or AVI.", 415)
 
 
+def costly() -> Refused:
+    """A video that would hold up the server."""
+    text = "looking at this video takes more time or memory than is given to it: convert it to MP4."
+    return Refused("costly", text, 422)
+
+
 def unusable(refused: Sequence[Advice]) -> Refused:
     """A video of which no avatar can be made, with the sentences of `ico3d create`."""
     return Refused("unusable", " ".join(map(str, refused)), 422, refused)

@@ -109,7 +109,7 @@ def test_each_edit_counts_as_a_copy_of_the_samples(tmp_path, monkeypatch):
 
 
 def test_samples_are_bounded_in_large_files_too(tmp_path, monkeypatch):
-    monkeypatch.setattr(promises, "MOST_SAMPLES", 1000)
+    monkeypatch.setattr(promises, "MOST_SAMPLES", 1005)  # five blocks of sound among them
     film = tmp_path / "a.mp4"
     for kind, times, refused in (
         (b"soun", TICKS, False),  # blocks of uncompressed sound
@@ -122,6 +122,21 @@ def test_samples_are_bounded_in_large_files_too(tmp_path, monkeypatch):
         film.write_bytes(
             BEGIN + box(b"mdat", bytes(99_999)) + box(b"moov", sound, track(*tables, kind=kind))
         )
+        if refused:
+            with pytest.raises(CaptureError, match="promise more"):
+                check_promises(film)
+        else:
+            assert check_promises(film)
+
+
+def test_pieces_of_uncompressed_sound_are_bounded_too(tmp_path, monkeypatch):
+    monkeypatch.setattr(promises, "MOST_SAMPLES", 1000)
+    film = tmp_path / "a.mov"
+    for chunks, samples, refused in ((999, 1000, False), (1000, 1000, True), (9, 10**6, False)):
+        times, sizes = table(b"stts", 1, samples, 1), table(b"stsz", 1, samples)
+        places = table(b"stco", chunks, *[0] * chunks)
+        sound = track(times, table(b"stsc", 1, 1, 1, 1), sizes, places, kind=b"soun")
+        film.write_bytes(BEGIN + box(b"mdat", bytes(10**6)) + box(b"moov", sound))
         if refused:
             with pytest.raises(CaptureError, match="promise more"):
                 check_promises(film)

@@ -9,6 +9,7 @@ from PIL import Image
 
 from ico3d.capture import decoding
 from ico3d.capture.face.mediapipe_face import Face
+from ico3d.capture.vetting import rehearsal
 from ico3d.creating.looking import samples
 from ico3d.errors import MissingModelError
 from ico3d.recording.guiding import seeing
@@ -16,6 +17,7 @@ from ico3d.recording.guiding.seeing import Eye, short_of, turn_of
 from ico3d.recording.refusals import Refused
 from support.needs import needs
 from support.recordings.films import write_heard
+from support.strangers.costly_films import SLOW
 from support.studio_page.parts import part_file
 
 pytestmark = [needs("av"), needs("cv2"), pytest.mark.slow]
@@ -182,6 +184,15 @@ def test_tables_that_promise_too_much_are_no_large_picture(eye, tmp_path):
     with pytest.raises(Refused) as refused:
         eye.report(file, "upload")
     assert refused.value.code == "no-video"
+
+
+@pytest.mark.parametrize("id", ["upload", "text-1", "consent"])
+def test_a_film_that_takes_too_much_to_be_opened_is_told(eye, tmp_path, monkeypatch, id):
+    monkeypatch.setattr(rehearsal, "MOST_SECONDS", 1)
+    (tmp_path / "x.part").write_bytes(SLOW["tags.avi"]())
+    with pytest.raises(Refused, match="more time or memory") as refused:
+        eye.report(tmp_path / "x.part", id)
+    assert (refused.value.code, refused.value.status) == ("costly", 422)
 
 
 def test_turns_by_name():

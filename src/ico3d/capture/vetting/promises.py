@@ -34,6 +34,8 @@ MOST_EDITS = 64
 """Stretches of a track that are played one after the other; each may copy all of its samples."""
 MOST_SAMPLES = 1 << 23
 """Pictures and packets of sound: 1,000 a second for two hours; each takes some forty bytes."""
+BLOCK = 1024
+"""Samples of uncompressed sound that FFmpeg takes together, within a chunk."""
 MOST_ITEMS = 1 << 16
 """Still pictures and their parts, which films do not have."""
 MOST_BOXES = 1 << 20
@@ -72,12 +74,13 @@ class _Track:
 
     @property
     def copied(self) -> float:
-        """Samples, with the copies that FFmpeg makes of them for edits."""
-        return self.promised * max(self.edits, 1)
+        """Samples or blocks, with the copies that FFmpeg makes of them for edits."""
+        blocks = self.offsets + self.promised / BLOCK
+        return (blocks if self.is_plain_sound else self.promised) * max(self.edits, 1)
 
     @property
     def is_plain_sound(self) -> bool:
-        """Whether it is uncompressed sound, for which FFmpeg makes room by blocks of samples."""
+        """Whether it is uncompressed sound, for which FFmpeg makes room by blocks of chunks."""
         single = len(self.times) == 1 and len(self.times[0]) == 1 and self.times[0][0, 1] == 1
         return single and b"soun" in self.kinds and b"vide" not in self.kinds
 
@@ -134,7 +137,7 @@ def _check(file: BinaryIO, size: int) -> None:
         more = _count(_content(file, start, end), end - start, tracks)
         pieces, items = pieces + more[0], items + more[1]
     every = pieces + sum(track.promised for track in tracks)
-    made = pieces + sum(track.copied for track in tracks if not track.is_plain_sound)
+    made = pieces + sum(track.copied for track in tracks)
     if every > size or made > MOST_SAMPLES or items > MOST_ITEMS:
         raise _Broken
 

@@ -20,7 +20,7 @@ from ico3d.creating.looking.sound_checks import sound_advice
 from ico3d.errors import CaptureError, Ico3dError, MissingExtraError, MissingModelError
 from ico3d.recording.guiding.guide import GOALS, Told, extremes, instruct, without_faces
 from ico3d.recording.keeping.plan import CONSENT, TURNS, UPLOAD, Turn
-from ico3d.recording.refusals import Refused, no_video, unusable
+from ico3d.recording.refusals import Refused, costly, no_video, unusable
 
 SIDE = 512
 """Upper limit of the short side of parts that are looked at, in pixels, as `ico3d create` has."""
@@ -152,13 +152,16 @@ def _check_size(file: Path) -> None:
     """Refuses a video whose pictures would fill the memory, before one is decoded.
 
     Raises:
-        Refused: If its file states larger ones than are taken, or promises what it cannot hold.
+        Refused: If its file states larger ones than are taken, promises what it cannot hold, or
+            takes too much to be opened.
     """
     try:
         opened(file).close()
     except CaptureError as error:
         if error.code == "decoding":
             raise no_video() from error
+        if error.code == "costly":
+            raise costly() from error
         text = "the pictures of this video are larger than is taken."
         raise Refused("large", text, 413) from error
 
