@@ -105,3 +105,21 @@ def test_no_picture_larger_than_is_taken_is_decoded_while_a_film_is_opened(tmp_p
     # had it been decoded, its size would be known and told
     with pytest.raises(CaptureError, match="cannot be decoded"):
         open_video(film, 48)
+
+
+def test_a_packet_of_thousands_of_sounds_does_not_fill_the_memory(tmp_path):
+    """FFmpeg decodes all of them at once: a megabyte of silence would take three gigabytes."""
+    film, silence = tmp_path / "a.mkv", np.zeros((2, 1024), np.float32)
+    with av.open(str(film), "w") as container:
+        stream = container.add_stream("aac", rate=48_000, layout="stereo")
+        for start in range(0, 10 * 1024, 1024):
+            frame = av.AudioFrame.from_ndarray(silence, "fltp", "stereo")
+            frame.rate, frame.pts = 48_000, start
+            for packet in stream.encode(frame):
+                container.mux(packet)
+        many = av.Packet(bytes(packet) * 30_000)
+        many.stream, many.time_base = stream, Fraction(1, 48_000)
+        many.pts = many.dts = 10 * 1024
+        container.mux(many)
+    sound = read_sound(film)
+    assert sound is not None and len(sound.samples) < 16_000

@@ -9,9 +9,8 @@ from starlette.testclient import TestClient
 from ico3d.chat.serving.sites import Sites
 from ico3d.cli import main
 from ico3d.creating.settings import QUALITIES
-from ico3d.errors import MissingModelError
 from ico3d.recording import app as server
-from ico3d.recording.guiding import seeing
+from ico3d.recording.guiding import looking
 from ico3d.recording.keeping.body_choice import HEAD_ALONE
 from ico3d.recording.keeping.person import Person
 from ico3d.recording.keeping.plan import scripts
@@ -19,6 +18,7 @@ from ico3d.recording.making.makers import Bodies
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE, Progress, write_progress
 from support.needs import needs
+from support.strangers.empty_pictures import write_empty_pictures
 from support.studio_page.parts import part_file
 
 pytestmark = [needs("av"), pytest.mark.slow]
@@ -26,13 +26,15 @@ KEY = "abcd-efgh-ijkl-mnop"
 HOME = "http://127.0.0.1:8766"
 
 
-def _lacking(*_):
-    raise MissingModelError("the face model is not installed.")
+@pytest.fixture(autouse=True)
+def blind(tmp_path, monkeypatch):
+    """A machine without models."""
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.delenv("ICO3D_MODELS", raising=False)
 
 
 @pytest.fixture
-def room(tmp_path, monkeypatch):
-    monkeypatch.setattr(seeing, "model_file", _lacking)
+def room(tmp_path):
     return server.open_room(tmp_path / "recordings", "127.0.0.1", False)
 
 
@@ -92,7 +94,6 @@ def test_nobody_is_asked_for_their_voice_unless_it_is_wanted(room):
 
 
 def test_a_voice_is_agreed_to_by_a_tick_of_its_own(tmp_path, monkeypatch):
-    monkeypatch.setattr(seeing, "model_file", _lacking)
     room = server.open_room(tmp_path / "recordings", "127.0.0.1", False, voices=True)
     client = _client(room)
     for lacking in ("openvoice is missing.", ""):
@@ -156,6 +157,16 @@ def test_a_video_of_which_nothing_can_be_made_is_gone_and_an_earlier_one_stays(
     assert (parts / "upload.mp4").read_bytes() == video
 
 
+def test_a_video_that_takes_too_much_is_gone(page, room, tmp_path, monkeypatch):
+    monkeypatch.setattr(looking, "SECONDS", 1.0)
+    monkeypatch.setattr(looking, "SECONDS_PER_MEGABYTE", 0.0)
+    write_empty_pictures(tmp_path / "costly.mkv", 400)
+    answer = _send(page, "left", (tmp_path / "costly.mkv").read_bytes(), size=1 << 20)
+    assert (answer.status_code, answer.json()["code"]) == (422, "costly")
+    assert not list((room.people.folder / "Ida" / "parts").glob("left*"))
+    assert page.get("/recordings/Ida").status_code == 200
+
+
 def test_a_body_is_chosen_and_kept_with_the_recording(page, room):
     shown = page.get("/recordings/").json()
     assert shown["builds"] == ["slender", "medium", "sturdy"]
@@ -176,7 +187,6 @@ def test_a_body_is_chosen_and_kept_with_the_recording(page, room):
 
 
 def test_a_body_that_cannot_look_so_is_refused_before_the_making(tmp_path, monkeypatch):
-    monkeypatch.setattr(seeing, "model_file", _lacking)
     missing = Bodies(tmp_path / "nobody.ico3d", HEAD_ALONE)
     room = server.open_room(tmp_path / "recordings", "127.0.0.1", False, missing)
     client = _client(room)
@@ -268,7 +278,7 @@ def test_a_full_disk_is_one_sentence(page, monkeypatch, video):
 
 
 def test_without_a_tracker_the_page_is_told(page):
-    assert page.get("/recordings/").json()["lacking"] == "the face model is not installed."
+    assert "face_landmarker.task" in page.get("/recordings/").json()["lacking"]
 
 
 def test_the_progress_and_the_face_are_shown(page, room):
@@ -318,11 +328,11 @@ def test_the_first_page_is_that_of_the_studio_and_may_ask_for_the_camera(page):
 def test_what_is_deleted_while_it_is_looked_at_stays_deleted(page, room, video, monkeypatch):
     """Whoever deletes while a part is being kept wins."""
 
-    def delete(file, id):
+    async def delete(file, id):
         room.people.delete("Ida")
         return {"seconds": 1.0, "turn": None, "advice": []}
 
-    monkeypatch.setattr(room.eye, "report", delete)
+    monkeypatch.setattr(room.looks, "report", delete)
     assert _send(page, "left", video).json()["code"] == "unknown"
     assert list(room.people.folder.iterdir()) == []
 

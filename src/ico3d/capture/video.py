@@ -24,6 +24,8 @@ FORMATS = (
     "yuv4mpegpipe"
 )
 """Other kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
+LARGEST_PACKET = 1 << 17
+"""Bytes of compressed sound that are decoded at once: what is silent takes 3,000 times as many."""
 
 
 @dataclass
@@ -259,7 +261,7 @@ def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
         stream: The stream of pictures or sound.
 
     Yields:
-        Frames of PyAV; None for a packet that is damaged.
+        Frames of PyAV; None for a packet that is damaged, or may hold too much sound.
     """
     from av.error import FFmpegError
 
@@ -269,8 +271,14 @@ def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
             packet = next(packets, None)
             if packet is None:
                 return
-            frames = packet.decode()
+            frames = [None] if _is_large(stream, packet) else packet.decode()
         except (FFmpegError, EOFError, OSError):
             yield None
             continue
         yield from frames
+
+
+def _is_large(stream: Any, packet: Any) -> bool:
+    """Whether a packet may hold many pieces of compressed sound, which are decoded at once."""
+    compressed = stream.type == "audio" and not stream.codec_context.name.startswith("pcm_")
+    return compressed and packet.size > LARGEST_PACKET

@@ -23,6 +23,7 @@ from ico3d.creating.settings import QUALITIES
 from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError
 from ico3d.recording.guiding.coverage import covered
+from ico3d.recording.guiding.looking import Looks
 from ico3d.recording.guiding.seeing import Eye, turn_of
 from ico3d.recording.keeping.body_choice import BUILDS, OUTFITS, as_form, chosen, write_choice
 from ico3d.recording.keeping.people import People
@@ -50,7 +51,8 @@ class Room:
 
     Attributes:
         people: The recordings.
-        eye: The face tracker.
+        eye: The face tracker, for pictures of the camera.
+        looks: Processes that look at parts.
         bodies: Which bodies avatars may get.
         makers: Processes that make avatars.
         talks: Servers of finished avatars.
@@ -61,6 +63,7 @@ class Room:
 
     people: People
     eye: Eye
+    looks: Looks
     bodies: Bodies
     makers: Makers
     talks: Talks
@@ -95,6 +98,7 @@ def make_app(room: Room, host: str, sites: Sites, names: tuple[str, ...] = ()) -
         await asyncio.to_thread(room.durations.close)
         await asyncio.to_thread(room.makers.close)
         await asyncio.to_thread(room.talks.close)
+        await asyncio.to_thread(room.looks.close)
         room.eye.close()
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
@@ -191,7 +195,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         person = room.people.person(name)
         file = person.unfinished(id, take)
         try:
-            report = await asyncio.to_thread(room.eye.report, file, id)
+            report = await room.looks.report(file, id)
         except Refused as error:
             if error.code in ("no-video", "costly", "unusable"):
                 person.discard(id, take)
@@ -356,4 +360,4 @@ def open_room(
     people.clear()
     makers = Makers(people, bodies)
     servers = makers, Talks(host, tls), Durations(makers.is_busy)
-    return Room(people, Eye(), bodies, *servers, voices, defaultdict(asyncio.Lock))
+    return Room(people, Eye(), Looks(), bodies, *servers, voices, defaultdict(asyncio.Lock))

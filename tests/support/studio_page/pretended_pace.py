@@ -3,7 +3,7 @@
 import os
 import threading
 
-from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.beside import end_with_parent
 
 if __name__ == "__main__":
     end_with_parent()

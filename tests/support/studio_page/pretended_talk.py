@@ -5,7 +5,7 @@ import sys
 import threading
 from pathlib import Path
 
-from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.beside import end_with_parent
 
 if __name__ == "__main__":
     end_with_parent()

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from ico3d.common.files import write_atomic
-from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.beside import end_with_parent
 
 if __name__ == "__main__":
     end_with_parent()

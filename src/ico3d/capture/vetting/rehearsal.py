@@ -6,11 +6,9 @@ minutes, or take gigabytes. What was opened there costs no more here.
 """
 
 import json
-import math
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import lru_cache
@@ -18,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ico3d.capture.vetting.limits import limit_addresses, limit_seconds, taken
 from ico3d.errors import CaptureError
 
 MOST_SECONDS = 5
@@ -83,36 +82,16 @@ def _main(path: str, how: str, seconds: str, bytes: str) -> int:
     """
     import av
 
-    before, options = _most_taken(), json.loads(how)
-    _limit(math.ceil(time.process_time()) + int(seconds), before + int(bytes) if before else 0)
+    options, before = json.loads(how), taken("VmPeak")
+    limit_seconds(int(seconds))
+    if before:
+        limit_addresses(before + int(bytes) + LARGEST_PIECE)
     with suppress(Exception), av.open(path, **options) as container:
         for stream in container.streams.video[:1]:
             stream.codec_context.options = options["options"]
             stream.codec_context.thread_count = 1  # threads would take memory for themselves
             next(container.decode(stream), None)
-    return COSTLY if _most_taken() - before > int(bytes) else 0
-
-
-def _limit(seconds: int, bytes: int) -> None:
-    """Limits this process to seconds of processor time, and to bytes of addresses unless 0."""
-    import resource
-
-    limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: seconds}
-    if bytes:
-        limits[resource.RLIMIT_AS] = bytes + LARGEST_PIECE
-    for what, most in limits.items():
-        hard = resource.getrlimit(what)[1]
-        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(what, (most, most))
-
-
-def _most_taken() -> int:
-    """Bytes of addresses that this process has had at most; 0 where the system does not tell."""
-    with suppress(OSError):
-        for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmPeak:"):
-                return int(line.split()[1]) << 10
-    return 0
+    return COSTLY if taken("VmPeak") - before > int(bytes) else 0
 
 
 if __name__ == "__main__":

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 
 from ico3d.creating.plan import expected
 from ico3d.creating.settings import QUALITIES, QualityName
+from ico3d.recording.beside import start, stop
 from ico3d.recording.keeping.person import Person
-from ico3d.recording.making.beside import start, stop
 from ico3d.recording.making.pace import SAID
 from ico3d.recording.making.sources import recorded_seconds
 

@@ -14,11 +14,11 @@ from ico3d.common.files import remove_unfinished
 from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.errors import StorageError
 from ico3d.failures import FAILURES
+from ico3d.recording.beside import FULL_DISK, start, stop
 from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice
 from ico3d.recording.keeping.people import People
 from ico3d.recording.keeping.person import Person, checked_id
 from ico3d.recording.keeping.plan import CONSENT
-from ico3d.recording.making.beside import FULL_DISK, start, stop
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, begun, read_progress, write_progress
 from ico3d.recording.making.sources import signature, sources

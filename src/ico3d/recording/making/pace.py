@@ -5,7 +5,7 @@ It is one of its own, for what it needs is large, and holds the GPU, until its p
 
 import sys
 
-from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.beside import end_with_parent
 
 SAID = "seconds of a step:"
 """What stands before the number that it prints."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ico3d.chat.commands import Serve
 from ico3d.errors import Ico3dError
-from ico3d.recording.making.beside import end_with_parent
+from ico3d.recording.beside import end_with_parent
 
 TLS = "tls"
 

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterable
 from pathlib import Path
 
-from ico3d.recording.making.beside import start, stop
+from ico3d.recording.beside import start, stop
 from ico3d.recording.refusals import Refused
 
 TALK = "ico3d.recording.making.talk"

@@ -18,9 +18,9 @@ from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError, printable
 from ico3d.failures import FAILURES
+from ico3d.recording.beside import FULL_DISK, end_with_parent
 from ico3d.recording.keeping.person import VOICE_CONSENT, Person
 from ico3d.recording.keeping.plan import UPLOAD
-from ico3d.recording.making.beside import FULL_DISK, end_with_parent
 from ico3d.recording.making.joining import join
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun

@@ -31,7 +31,12 @@ def end_with_parent() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def start(module: str, words: Sequence[str], out: IO[bytes] | int) -> subprocess.Popen[bytes]:
+def start(
+    module: str,
+    words: Sequence[str],
+    out: IO[bytes] | int,
+    errors: IO[bytes] | int | None = subprocess.STDOUT,
+) -> subprocess.Popen[bytes]:
     """Starts a module of ico3d in a process group of its own.
 
     It imports nothing from the folder in which the server was started (`-P`).
@@ -39,13 +44,14 @@ def start(module: str, words: Sequence[str], out: IO[bytes] | int) -> subprocess
     Args:
         module: Its name.
         words: Its arguments.
-        out: What takes its output and its errors.
+        out: What takes its output.
+        errors: What takes its errors: by default what takes its output, or None for the server's.
     """
     return subprocess.Popen(
         [sys.executable, "-P", "-m", module, *words],
         stdin=subprocess.PIPE,
         stdout=out,
-        stderr=subprocess.STDOUT,
+        stderr=errors,
         start_new_session=True,
     )
 

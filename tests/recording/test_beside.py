@@ -2,7 +2,7 @@
 
 import subprocess
 
-from ico3d.recording.making.beside import start
+from ico3d.recording.beside import start
 
 
 def test_modules_of_the_folder_are_not_imported(tmp_path, monkeypatch):

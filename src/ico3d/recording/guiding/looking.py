@@ -1,0 +1,123 @@
+"""Looks at each part in a process of its own, which ends where the part takes too much.
+
+A few megabytes can keep FFmpeg for hours or fill the memory, and nothing stops it from within a
+process; a damaged file may end it.
+"""
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+from ico3d.capture.vetting.limits import limit_memory, limit_seconds
+from ico3d.common.typed import plain
+from ico3d.creating.looking.advice import Advice
+from ico3d.errors import CaptureError
+from ico3d.recording.beside import end_with_parent, start, stop
+from ico3d.recording.guiding.seeing import Eye
+from ico3d.recording.refusals import Refused, costly
+
+LOOK = "ico3d.recording.guiding.looking"
+MOST_AT_ONCE = 2
+"""Parts that are looked at at a time; others wait."""
+SECONDS, SECONDS_PER_MEGABYTE = 120.0, 30.0
+"""Processor time that a look may take: recordings take 2 s per megabyte, those of 70 kbit/s, in
+which faces are sought as often, 14."""
+MOST_BYTES = 4 << 30
+"""Memory that a look may take besides the tracker: two hours of sound take 0.5 GB, pictures of
+8192 × 4320 pixels 0.1 GB each, and one is decoded on each processor."""
+SLOWEST = 20.0
+"""Seconds by the clock in which a second of processor time is had, on the busiest machine."""
+
+
+class Looks:
+    """Processes that look at parts, a few at a time."""
+
+    def __init__(self):
+        """Starts none yet."""
+        self._places = asyncio.Semaphore(MOST_AT_ONCE)
+        self._running: set[subprocess.Popen[bytes]] = set()
+
+    async def report(self, file: Path, id: str) -> dict[str, Any]:
+        """What is found in a part, as `Eye.report` tells it.
+
+        Args:
+            file: The recording.
+            id: The part.
+
+        Raises:
+            Refused: As `Eye.report`, or if it takes too much time or memory.
+        """
+        async with self._places:
+            return await asyncio.to_thread(self._report, file, id)
+
+    def close(self) -> None:
+        """Ends the looks that go on."""
+        for process in list(self._running):
+            stop(process)
+
+    def _report(self, file: Path, id: str) -> dict[str, Any]:
+        size = file.stat().st_size if file.is_file() else 0  # it may be deleted by now
+        seconds = SECONDS + SECONDS_PER_MEGABYTE * size / 1e6
+        words = [str(file), id, str(seconds), str(MOST_BYTES)]
+        process = start(LOOK, words, subprocess.PIPE, errors=None)
+        self._running.add(process)
+        slow = threading.Timer(SLOWEST * seconds, process.kill)
+        slow.start()
+        try:
+            assert process.stdout is not None
+            told = process.stdout.read()
+            status = process.wait()
+        finally:
+            slow.cancel()
+            self._running.discard(process)
+            stop(process)
+        if status < 0:
+            raise costly()
+        if status:
+            raise CaptureError(f"{file.name}: the process that looks at parts has failed.")
+        return _answer(json.loads(told))
+
+
+def _answer(told: dict[str, Any]) -> dict[str, Any]:
+    """The report that a process tells.
+
+    Raises:
+        Refused: If it refuses the part.
+    """
+    if "report" in told:
+        return told["report"]
+    code, text, status, advice = told["refused"]
+    raise Refused(code, text, status, [Advice(**one) for one in advice])
+
+
+def _look(file: str, id: str, seconds: str, bytes: str) -> None:
+    """What the process does."""
+    end_with_parent()
+    answer = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what libraries print is no answer
+    eye = Eye()
+    limit_seconds(float(seconds))
+    limit_memory(int(bytes))
+    try:
+        told: dict[str, Any] = {"report": eye.report(Path(file), id)}
+    except MemoryError:
+        told = {"refused": _plain(costly())}
+    except Refused as error:
+        told = {"refused": _plain(error)}
+    json.dump(told, answer)
+    answer.flush()
+    os._exit(0)  # libraries' threads may not end
+
+
+def _plain(error: Refused) -> list[Any]:
+    """A refusal as JSON can hold it."""
+    return [error.code, str(error), error.status, plain(error.advice)]
+
+
+if __name__ == "__main__":
+    _look(*sys.argv[1:])
