@@ -62,6 +62,24 @@ async def test_a_line_of_events_is_bounded_across_pieces(monkeypatch, pieces, fi
             await response.aread()
 
 
+@pytest.mark.parametrize("kind", ["text/event-stream", "TEXT/Event-Stream"])
+async def test_events_are_known_in_any_case(kind):
+    from ico3d.chat.services.bounded import is_events
+
+    assert is_events(httpx2.Response(200, headers={"Content-Type": kind}))
+
+
+async def test_texts_are_utf_8_whatever_their_type_says():
+    """Python takes the square of a text's length for the coding punycode."""
+    from ico3d.chat.services import bounded
+
+    said = "grüß dich"
+    kind = {"Content-Type": "text/plain; charset=punycode"}
+    response = httpx2.Response(500, headers=kind, content=said.encode())
+    await bounded.bound(response)
+    assert response.text == said
+
+
 async def test_an_answer_calls_few_functions(monkeypatch):
     from pipecat.services.llm_service import FunctionCallFromLLM
     from pipecat.services.openai.llm import OpenAILLMService

@@ -38,20 +38,61 @@ async def test_answers_are_short_and_plain(monkeypatch):
     assert accepted == ["identity"] * 3
 
 
-async def test_events_come_no_faster_than_visitors_can_bear(monkeypatch):
-    from ico3d.chat.services.bounded import EVENTS
+@pytest.fixture
+async def answered(monkeypatch):
+    """Opens what a server answers in pieces, of a type, as the SDK does."""
     from ico3d.chat.tools import bounded_http
 
-    monkeypatch.setattr(bounded_http, "EVENTS_AT_ONCE", 20.0)
-    app = FastAPI()
+    monkeypatch.setattr(bounded_http, "LINES_AT_ONCE", 80.0)
 
-    @app.get("/{count}")
-    async def events(count: int) -> Response:
-        return Response(b"event: message\ndata: {}\n\n" * count, media_type=EVENTS)
+    async def events(pieces, kind="text/event-stream"):
+        async def sent():
+            for piece in pieces:
+                yield piece
 
-    transport = bounded_http.BoundedTransport(trust_env=False)
-    async with running(app) as port, httpx2.AsyncClient(transport=transport) as client:
-        url = f"http://127.0.0.1:{port}"
-        assert (await client.get(f"{url}/20")).content.count(b"data:") == 20
-        with pytest.raises(httpx2.ReadError, match="too many events"):
-            await client.get(f"{url}/21")
+        async def answer(self, request):
+            return httpx2.Response(200, headers={"Content-Type": kind}, content=sent())
+
+        monkeypatch.setattr(httpx2.AsyncHTTPTransport, "handle_async_request", answer)
+        transport = bounded_http.BoundedTransport(trust_env=False)
+        async with (
+            httpx2.AsyncClient(transport=transport) as client,
+            client.stream("GET", "http://127.0.0.1/") as response,
+        ):
+            return [event async for event in httpx2.EventSource(response)]
+
+    return events
+
+
+EVENT = b"id: 1\nevent: message\ndata: {}\n\n"
+
+
+@pytest.mark.parametrize(
+    "pieces",
+    [
+        [EVENT * 20],
+        [EVENT[:8], EVENT[8:]] * 20,
+        [bytes([one]) for one in EVENT * 20],
+        [bytes([one]) for one in EVENT.replace(b"\n", b"\r\n") * 20],
+        [EVENT.replace(b"\n", b"\r") * 20],
+    ],
+)
+@pytest.mark.parametrize("kind", ["text/event-stream", "Text/Event-Stream; charset=utf-8"])
+async def test_events_come_no_faster_than_visitors_can_bear(answered, pieces, kind):
+    assert len(await answered(pieces, kind)) == 20
+    with pytest.raises(httpx2.ReadError, match="too many events"):
+        await answered(pieces * 2, kind)
+
+
+@pytest.mark.parametrize(
+    "pieces", [[b"id:1\n\n"] * 80, [b"retry:1\r\r" * 80], [b": ping\n"] * 160, [b":", b"\n"] * 160]
+)
+async def test_events_without_data_count(answered, pieces):
+    with pytest.raises(httpx2.ReadError, match="too many events"):
+        await answered(pieces)
+
+
+@pytest.mark.parametrize("coding", ["unicode_escape", "utf-7", "punycode"])
+async def test_events_are_utf_8_whatever_their_type_says(answered, coding):
+    hidden = (b"id:1\\n\\n", b"id:1+AAoACg-", b"id:1")
+    assert await answered(hidden * 100, f"text/event-stream; charset={coding}") == []

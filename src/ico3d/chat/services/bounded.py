@@ -17,12 +17,15 @@ async def ask_plain(request: httpx2.Request) -> None:
     request.headers["Accept-Encoding"] = PLAIN
 
 
-async def refuse_compressed(response: httpx2.Response) -> None:
-    """Closes an answer that is compressed all the same.
+async def ensure_plain(response: httpx2.Response) -> None:
+    """Closes an answer that is compressed all the same, and has every other read as UTF-8.
+
+    Python knows codings that take hours, and some that hide where lines end.
 
     Raises:
-        ReadError: If it is.
+        ReadError: If it is compressed.
     """
+    response.encoding = "utf-8"
     if response.headers.get("Content-Encoding", PLAIN) != PLAIN:
         await response.aclose()
         raise httpx2.ReadError("its answer is compressed")
@@ -30,7 +33,7 @@ async def refuse_compressed(response: httpx2.Response) -> None:
 
 def is_events(response: httpx2.Response) -> bool:
     """Whether an answer is a stream of events."""
-    return response.headers.get("Content-Type", "").startswith(EVENTS)
+    return response.headers.get("Content-Type", "").strip().lower().startswith(EVENTS)
 
 
 async def bound(response: httpx2.Response, most: int | None = None) -> None:
@@ -43,7 +46,7 @@ async def bound(response: httpx2.Response, most: int | None = None) -> None:
     Raises:
         ReadError: If the answer is compressed; while it is read, if it is too large.
     """
-    await refuse_compressed(response)
+    await ensure_plain(response)
     response.stream = _Bounded(response.stream, is_events(response), most or MOST_BYTES)
 
 

@@ -5,13 +5,14 @@ from collections.abc import AsyncIterator
 
 import httpx2
 
-from ico3d.chat.services.bounded import Wrapped, ask_plain, is_events, refuse_compressed
+from ico3d.chat.services.bounded import Wrapped, ask_plain, ensure_plain, is_events
 from ico3d.chat.supervision.allowance import Bucket
 
 MOST_BYTES = 4 << 20
 """Of an answer, which may be the list of all functions."""
-EVENT_RATE, EVENTS_AT_ONCE = 50.0, 1000.0
-"""Events of a server per second for long, and at once: each costs the loop of all visitors time."""
+LINE_RATE, LINES_AT_ONCE = 200.0, 4000.0
+"""Lines of a server's events per second for long, and at once: each costs the loop of all visitors
+time. An event has three or four."""
 
 
 class BoundedTransport(httpx2.AsyncHTTPTransport):
@@ -23,7 +24,7 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
     def __init__(self, trust_env: bool = True):
         """Connects; proxies that the environment names are used if that is trusted."""
         super().__init__(trust_env=trust_env)
-        self._events = Bucket(EVENT_RATE, EVENTS_AT_ONCE, time.monotonic)  # of all streams
+        self._lines = Bucket(LINE_RATE, LINES_AT_ONCE, time.monotonic)  # of all streams
 
     async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
         """Sends a request.
@@ -34,10 +35,10 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
         """
         await ask_plain(request)
         response = await super().handle_async_request(request)
-        await refuse_compressed(response)
+        await ensure_plain(response)
         paced = is_events(response)
         stream = response.stream
-        response.stream = _Paced(stream, self._events) if paced else _Bounded(stream)
+        response.stream = _Paced(stream, self._lines) if paced else _Bounded(stream)
         return response
 
 
@@ -54,14 +55,21 @@ class _Bounded(Wrapped):
 
 
 class _Paced(Wrapped):
-    """The bytes of a stream of events, as long as these do not come too fast."""
+    """The bytes of a stream of events, as long as their lines do not come too fast."""
 
-    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, events: Bucket):
+    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, lines: Bucket):
         super().__init__(stream)
-        self._events = events
+        self._lines = lines
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
+        last = b""
         async for piece in self._stream:
-            if not self._events.take(piece.count(b"data:") + piece.count(b"\n:")):
+            if not self._lines.take(_ends(last + piece) - _ends(last)):
                 raise httpx2.ReadError("it sends too many events")
+            last = piece[-1:]
             yield piece
+
+
+def _ends(text: bytes) -> int:
+    """Number of line ends, as streams of events may have them: one of two characters, or both."""
+    return text.count(b"\n") + text.count(b"\r") - text.count(b"\r\n")
