@@ -1,5 +1,7 @@
 """Upper limits for bundles, so that a hostile bundle cannot exhaust memory."""
 
+from ico3d.rig.pose_regression import MOST_KNOWN
+
 MAX_FILES = 256
 MAX_FILE_BYTES = 256 << 20
 MAX_BUNDLE_BYTES = 512 << 20
@@ -19,7 +21,7 @@ MAX_BACKGROUND_BYTES = 64 << 20
 MAX_SHAPES = 8
 MAX_POSED_FRAMES = 30_000
 """Frames of a body on a skeleton, whose numbers are stored in 16 bits."""
-MAX_KNOWN_POSES = 256
+MAX_KNOWN_POSES = MOST_KNOWN
 """Stored poses with which a page compares every pose."""
 MAX_CASTERS = 20_000
 """Spheres that a page draws into a shadow map at every pose."""

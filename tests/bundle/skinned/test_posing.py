@@ -12,7 +12,6 @@ from ico3d.bundle.skinned.posing import (
     any_pose,
     harmonics,
     joint_table,
-    kernel_width,
     posed,
     recorded_pose,
 )
@@ -121,7 +120,7 @@ def test_motion_is_continuous(frame):
 @settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_coefficients_of_any_pose_are_those_that_training_interpolates(seed):
-    """The same as torch, also for a pose far from all known ones."""
+    """Of all joints, held ones too; also for a pose far from all known ones."""
     import torch
 
     from ico3d.body.skinning.coefficients import interpolated
@@ -192,10 +191,6 @@ def test_joints_that_stand_still_are_kept_once():
     dots = np.abs((rotations / QUAT_UNIT * given[:, [0, 3]]).sum(-1))
     np.testing.assert_allclose(dots, 1, atol=1e-4)
     assert len(packed_rotations(given[:, 1:2], 0.05)[1]) == 1  # the root moves by definition
-
-
-def test_kernel_of_a_single_pose():
-    assert kernel_width(np.array([[[1.0, 0, 0, 0]]])) == 1.0
 
 
 @given(st.integers(0, 1000))

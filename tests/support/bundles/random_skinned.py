@@ -11,8 +11,8 @@ from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_weights
-from ico3d.bundle.skinned.posing import kernel_width
 from ico3d.bundle.tensors import QUAT_UNIT
+from ico3d.rig.pose_regression import kernel_width
 from support.bundles.random_body import body_manifest, random_windows
 from support.bundles.random_bundle import thumbnail
 

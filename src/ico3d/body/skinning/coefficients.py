@@ -6,16 +6,11 @@ import torch
 from torch import Tensor
 
 from ico3d.body.skinning.kinematics import unit
+from ico3d.common.spread import spread
+from ico3d.rig.pose_regression import MOST_KNOWN, PoseRegression, kernel_width
 
 LAYERS = ("weight0", "bias0", "weight1", "bias1")
 """Names of the network's tensors: (3·J, H), (H,), (H, K) and (K,)."""
-NEAREST = 2.0
-"""Width of the kernel, over the median distance of trained poses to their nearest neighbours."""
-FARTHER = 0.5
-"""Share of the distance to the nearest trained pose that is added, in squares, to the width.
-
-So a pose unlike all trained ones takes a mean of several, not the cast shadows of a single one.
-"""
 
 
 def features(rotations: Tensor) -> Tensor:
@@ -57,10 +52,10 @@ def network(weights: dict[str, Tensor], rotations: Tensor) -> Tensor:
 
 
 def interpolated(known: Tensor, coefficients: Tensor, rotations: Tensor) -> Tensor:
-    """Coefficients of a pose that was not trained: a weighted mean of those of trained poses.
+    """Coefficients of a pose that was not trained, found from those of trained poses.
 
-    The network could give values outside of the range that it was trained for; the weighted mean
-    (Nadaraya-Watson with a Gaussian kernel) cannot.
+    The network could give values outside of the range that it was trained for; `PoseRegression`
+    cannot.
 
     Args:
         known: (F, J, 4) trained poses, wxyz.
@@ -70,10 +65,7 @@ def interpolated(known: Tensor, coefficients: Tensor, rotations: Tensor) -> Tens
     Returns:
         (K,) coefficients of the new pose.
     """
-    places, place = features(known), features(rotations)  # (F, 3·J), (3·J,)
-    between = torch.cdist(places, places)  # (F, F)
-    between.fill_diagonal_(math.inf)
-    width = NEAREST * between.amin(1).median() if len(known) > 1 else place.new_ones(())
-    away = (places - place).square().sum(1)  # (F,)
-    square = width.clamp_min(1e-6).square() + FARTHER**2 * away.min()
-    return torch.softmax(-away / (2 * square), 0) @ coefficients
+    some = spread(len(known), MOST_KNOWN)
+    poses, values = (part[some].cpu().double().numpy() for part in (known, coefficients))
+    regression = PoseRegression(poses, values, kernel_width(poses))
+    return torch.from_numpy(regression.at(rotations.cpu().double().numpy())).to(coefficients)

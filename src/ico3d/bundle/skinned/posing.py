@@ -1,20 +1,19 @@
 """The reference evaluator of a body on a skeleton; shaders are tested against it."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from ico3d.bundle.skinned.baked import SCALE_UNITS, WEIGHT_UNIT, BakedSkinned
 from ico3d.bundle.skinned.lamp import lamp_light
 from ico3d.bundle.tensors import QUAT_UNIT
+from ico3d.rig.pose_regression import PoseRegression
 from ico3d.rig.quaternions import Array, multiply, normalized, slerp
 
 _FIRST = 0.4886025119029199
 _SECOND = (1.0925484305920792, 0.31539156525252005, 0.5462742152960396)
 """Factors of the real spherical harmonics of degree 1 (`_FIRST`) and 2."""
-FARTHER = 0.5
-"""Share of the distance to the nearest known pose that is added, in squares, to the kernel's width.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +80,7 @@ def recorded_rotations(baked: BakedSkinned) -> Array:
 def any_pose(baked: BakedSkinned, rotations: Array, root: Array) -> SkinnedPose:
     """A pose that need not have been recorded.
 
-    Its coefficients are a mean of those of the known poses, weighted by a Gaussian kernel of the
-    distance between features of poses (as in `ico3d.body.skinning.coefficients.interpolated`).
+    Its coefficients are found from those of the known poses (`PoseRegression`).
 
     Args:
         baked: The body.
@@ -90,13 +88,15 @@ def any_pose(baked: BakedSkinned, rotations: Array, root: Array) -> SkinnedPose:
         root: (3,) translation of the root from rest, metres.
     """
     rotations = normalized(np.asarray(rotations, np.float64))
+    residual = _coefficients(baked).at(rotations)  # (K,)
+    return SkinnedPose(rotations, np.asarray(root, np.float64), residual)
+
+
+@lru_cache(maxsize=4)
+def _coefficients(baked: BakedSkinned) -> PoseRegression:
     known = np.repeat(baked.held[None] / QUAT_UNIT, len(baked.known), 0)  # (P, J, 4)
     known[:, baked.moving] = baked.rotations[baked.known] / QUAT_UNIT
-    away = np.square(_features(known) - _features(rotations)).sum(1)  # (P,)
-    square = float(baked.kernel_width[0]) ** 2 + FARTHER**2 * away.min()
-    parts = np.exp((away.min() - away) / (2 * square))  # (P,)
-    residual = (parts / parts.sum()) @ baked.coefficients[baked.known]  # (K,)
-    return SkinnedPose(rotations, np.asarray(root, np.float64), residual)
+    return PoseRegression(known, baked.coefficients[baked.known], float(baked.kernel_width[0]))
 
 
 def joint_table(baked: BakedSkinned, pose: SkinnedPose) -> Array:
@@ -154,26 +154,3 @@ def harmonics(normals: Array) -> Array:
     first = [-_FIRST * y, _FIRST * z, -_FIRST * x]
     second = [a * x * y, -a * y * z, b * (2 * z * z - x * x - y * y), -a * x * z]
     return np.stack([*first, *second, c * (x * x - y * y)], 1)
-
-
-def kernel_width(rotations: Array) -> float:
-    """Width of the interpolation's kernel for known poses (P, M, 4), in units of their features.
-
-    It is twice the median of the poses' distances to their nearest neighbours.
-    """
-    places = _features(rotations)  # (P, 3·M)
-    if len(places) < 2:
-        return 1.0
-    squares = np.square(places).sum(1)  # (P,)
-    between = squares[:, None] + squares - 2 * places @ places.T  # (P, P)
-    np.fill_diagonal(between, np.inf)
-    nearest = np.sqrt(np.maximum(between.min(1), 0))  # (P,)
-    # As torch.median does, the lower one of two values in the middle is taken.
-    return max(2.0 * float(np.sort(nearest)[(len(nearest) - 1) // 2]), 1e-6)
-
-
-def _features(rotations: Array) -> Array:
-    """(..., 3·M) features of poses (..., M, 4): sin(angle / 2) times the axis of each rotation."""
-    quats = normalized(rotations)
-    signed = np.where(quats[..., :1] < 0, -quats, quats)[..., 1:]  # (..., M, 3)
-    return signed.reshape(*signed.shape[:-2], -1)

@@ -1,5 +1,6 @@
 import type { SkinnedInfo } from '../../bundle/manifest.ts';
-import { quatAt, slerp, upper, type Quat, type Vector } from '../../rig/quaternions.ts';
+import { PoseRegression } from '../../rig/pose-regression.ts';
+import { quatAt, slerp, upper, type Vector } from '../../rig/quaternions.ts';
 import { Rig } from '../../rig/rig.ts';
 import type { RecordedPoses } from './baked.ts';
 
@@ -13,31 +14,30 @@ export interface Pose {
 /** Numbers in a joint's row of a table: the three rows of the matrix (R | t), then the quaternion wxyz of R. */
 export const TABLE_ROW = 16;
 
-/** Share of the distance to the nearest known pose that is added, in squares, to the kernel's width. */
-const FARTHER = 0.5;
-
 /** Forward kinematics of a rig, its recorded poses, and coefficients of the residual shapes in any pose. */
 export class Skeleton {
   readonly rig: Rig;
   private readonly info: SkinnedInfo;
   private readonly poses: RecordedPoses;
   private readonly held: Float64Array; // (J,4) local rotations of joints that do not turn in the recording
-  private readonly known: Float64Array; // (P,3·M) features of the known poses
+  private readonly residual: PoseRegression; // coefficients of the residual shapes
 
   constructor(info: SkinnedInfo, poses: RecordedPoses) {
     this.info = info;
     this.poses = poses;
-    const { joints, held, known, rotations } = poses;
+    const { joints, held, known } = poses;
     const rest = info.parents.map((_, j): Vector => [joints[3 * j]!, joints[3 * j + 1]!, joints[3 * j + 2]!]);
     this.rig = new Rig(info.parents, rest);
     this.held = Float64Array.from(info.names.flatMap((_, j) => quatAt(held, j)));
-    const moving = info.num_moving;
-    this.known = new Float64Array(3 * moving * info.num_known);
-    for (let p = 0; p < info.num_known; p++) {
-      for (let m = 0; m < moving; m++) {
-        this.known.set(feature(quatAt(rotations, known[p]! * moving + m)), 3 * (p * moving + m));
-      }
-    }
+    const rotations = new Float64Array(this.held.length * known.length);
+    const values = new Float64Array(info.num_shapes * known.length);
+    const pose = this.empty();
+    known.forEach((frame, p) => {
+      this.recorded(frame, pose);
+      rotations.set(pose.rotations, p * pose.rotations.length);
+      values.set(pose.residual, p * pose.residual.length);
+    });
+    this.residual = new PoseRegression({ count: known.length, rotations, values, width: poses.kernelWidth });
   }
 
   /** A new pose to write into, which is the rest pose. */
@@ -63,34 +63,9 @@ export class Skeleton {
     mix(coefficients, shapes, first, part, out.residual);
   }
 
-  /** Writes the coefficients of any pose: a mean of those of the known poses, weighted by a Gaussian kernel. */
+  /** Writes the coefficients of any pose, found from those of the known poses. */
   interpolate(pose: Pose): void {
-    const { num_moving: moving, num_shapes: shapes, num_known: count } = this.info;
-    const { kernelWidth, coefficients, known } = this.poses;
-    const here = new Float64Array(3 * moving);
-    this.poses.moving.forEach((joint, m) => here.set(feature(quatAt(pose.rotations, joint)), 3 * m));
-    const away = Float64Array.from({ length: count }, (_, p) =>
-      here.reduce((sum, value, i) => sum + (this.known[3 * moving * p + i]! - value) ** 2, 0),
-    );
-    const nearest = away.reduce((least, value) => Math.min(least, value), Infinity);
-    const square = kernelWidth ** 2 + FARTHER ** 2 * (nearest + this.awayFromHeld(pose));
-    const parts = away.map((value) => Math.exp((nearest - value) / (2 * square)));
-    const total = parts.reduce((sum, value) => sum + value, 0);
-    pose.residual.fill(0);
-    parts.forEach((part, p) => {
-      for (let k = 0; k < shapes; k++) pose.residual[k]! += (part / total) * coefficients[known[p]! * shapes + k]!;
-    });
-  }
-
-  /** Squared distance of features of the joints that do not turn in the recording from how they are held there. */
-  private awayFromHeld({ rotations }: Pose): number {
-    let sum = 0;
-    for (const j of this.info.names.keys()) {
-      if (this.poses.moving.includes(j)) continue;
-      const [held, here] = [this.held, rotations].map((all) => feature(quatAt(all, j)));
-      for (const i of here!.keys()) sum += (held![i]! - here![i]!) ** 2;
-    }
-    return sum;
+    this.residual.at(pose.rotations, pose.residual);
   }
 
   /** Writes the rigid transforms of the joints from rest to the world: (J, TABLE_ROW). */
@@ -114,12 +89,6 @@ export function placesOf(rest: readonly Vector[], table: Float32Array): Float32A
     const row = TABLE_ROW * joint + 4 * axis;
     return table[row]! * x + table[row + 1]! * y + table[row + 2]! * z + table[row + 3]!;
   });
-}
-
-/** Features of a joint's rotation by which poses are compared: sin(angle / 2) times the axis. */
-function feature(quat: Quat): Vector {
-  const [, x, y, z] = upper(quat);
-  return [x, y, z];
 }
 
 /** Writes the linear interpolation between row `first` (part 0) and the next one (part 1). */

@@ -15,9 +15,9 @@ from ico3d.bundle.skinned.baked import SCALE_UNITS, BakedSkinned
 from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
-from ico3d.bundle.skinned.posing import kernel_width
 from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.common.spread import spread
+from ico3d.rig.pose_regression import kernel_width
 
 STILL = 0.05
 """A joint that turns by no more than this many degrees in the recording is stored as held."""
