@@ -1,0 +1,52 @@
+import { join } from 'node:path';
+import type { Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
+import { Browser } from '../../support/browser/browser.ts';
+import { drawnBy } from '../../support/browser/path.ts';
+import { keepSound } from '../../support/browser/talk.ts';
+
+const { demoUrl, talkingUrl } = inject('shared');
+const LOW = [
+  [844, 390],
+  [844, 330],
+  [667, 320],
+  [568, 320],
+  [390, 844],
+] as const;
+
+describe.each(['en', 'de', 'es', 'fr', 'ja', 'zh'])('the start screen (%s)', (language) => {
+  let browser: Browser;
+  let page: Page;
+
+  beforeAll(async () => {
+    browser = await Browser.launch({ width: 844, height: 390, calm: true });
+    ({ page } = browser);
+    await keepSound(page);
+    await page.addInitScript((language) => localStorage.setItem('ico3d-language', language), language);
+    await browser.open(drawnBy('soft', demoUrl ?? talkingUrl));
+    await page.waitForSelector('#choices:visible');
+    await page.waitForSelector('#thumbnail:visible');
+  });
+
+  afterAll(() => browser?.close());
+
+  test.each(LOW)('fits into %i × %i: name, words and both buttons', async (width, height) => {
+    await page.setViewportSize({ width, height });
+    if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `start-${language}-${width}x${height}.png`) });
+    const parts = await page.$$eval('.portrait, .card h2, .card p, .card button', (parts) =>
+      parts.map((part) => ({ text: part.textContent, ...(part.getBoundingClientRect().toJSON() as DOMRect) })).filter(({ height }) => height > 0),
+    );
+    expect(parts.length).toBeGreaterThanOrEqual(5);
+    for (const { text, top, bottom } of parts) expect.soft(top >= 0 && bottom <= height, `${text}: ${top} to ${bottom}`).toBe(true);
+  });
+
+  test('scrolls to all of it where it cannot fit', async () => {
+    await page.setViewportSize({ width: 844, height: 160 });
+    const seen = async (what: string) => {
+      await page.locator(what).scrollIntoViewIfNeeded();
+      const { y, height } = (await page.locator(what).boundingBox())!;
+      return y >= 0 && y + height <= 160;
+    };
+    expect([await seen('#start-typing'), await seen('.portrait'), await seen('#start')]).toEqual([true, true, true]);
+  });
+});
