@@ -9,10 +9,15 @@ import { VIEWS } from '../../src/stage/camera/framing.ts';
 
 const AROUND = 'header button, #name, #state, header .way-back, main > *';
 const LONG = 'Words that fill a line, and then another one, and more of them. '.repeat(8);
+const NOTICE = 'Das Mikrofon ist für diese Seite gesperrt: Erlauben Sie es in der Adressleiste, oder tippen Sie.';
 const SIZES = [
   [844, 390],
   [667, 375],
+  [800, 450],
+  [844, 330], // with the bars of a browser
+  [844, 200], // with a keyboard
   [390, 844],
+  [352, 516], // floats on another page
   [1440, 900],
   [1280, 800],
 ] as const;
@@ -62,21 +67,88 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       await page.evaluate((view) => window.ico3d!.stage.orbit.show(view), view);
       const { head, over } = await overHead(page, AROUND);
       if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `overlays-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`) });
-      expect(head).toBeGreaterThan(300);
+      expect(head).toBeGreaterThan(height > 256 ? 300 : 100);
       expect(over).toEqual([]);
     });
 
     test('does not cover one another, and is all in the picture', async () => {
-      const boxes = await page.$$eval('header button, #name, #captions, #stop, #composer', (parts) =>
+      const boxes = await page.$$eval('header button, #name, #state, #captions, #stop, #composer', (parts) =>
         parts.map((part) => ({ name: part.id || (part as HTMLElement).title, ...(part.getBoundingClientRect().toJSON() as DOMRect) })).filter(({ width }) => width > 0),
       );
-      expect(boxes.length).toBe(headsets ? 14 : 12);
+      const views = height > 256 ? VIEWS.length : 0; // over a keyboard there is no room for their buttons
+      expect(boxes.length).toBe(10 + views + (headsets ? 2 : 0));
       for (const [i, a] of boxes.entries()) {
         expect.soft(a.left >= 0 && a.top >= 0 && a.right <= width && a.bottom <= height, a.name).toBe(true);
         for (const b of boxes.slice(i + 1)) {
           expect.soft(a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom, `${a.name} and ${b.name}`).toBe(false);
         }
       }
+    });
+
+    test('shows what was asked, and as much of the answer as there is room for', async () => {
+      const { asked, lines } = await page.evaluate(() => {
+        const answer = document.getElementById('answer')!;
+        return { asked: document.getElementById('question')!.clientHeight, lines: answer.clientHeight / parseFloat(getComputedStyle(answer).lineHeight) };
+      });
+      expect(asked).toBeGreaterThan(10);
+      expect(lines).toBeGreaterThan(height < 256 ? 1.9 : width === 667 ? 2.9 : 3.9);
+      expect(Math.abs(lines - Math.round(lines))).toBeLessThan(0.05);
+    });
+
+    test.runIf(height < 480).each(VIEWS)('has a notice beside her in the view %s, over nothing else', async (view) => {
+      await page.evaluate(([view, text]) => {
+        window.ico3d!.stage.orbit.show(view);
+        document.getElementById('notices')!.replaceChildren(Object.assign(document.createElement('p'), { textContent: text }));
+      }, [view, NOTICE] as const);
+      const { over } = await overHead(page, '#notices p');
+      if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `notice-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`) });
+      const covered = await page.evaluate(() => {
+        const [notice, ...others] = ['#notices p', '#captions', '#stop', '#composer', '#state', ...document.querySelectorAll('header button')].map((part) => {
+          const element = typeof part === 'string' ? document.querySelector(part)! : part;
+          return { name: element.id || element.textContent, ...(element.getBoundingClientRect().toJSON() as DOMRect) };
+        });
+        const { left, top, right, bottom } = notice!;
+        return { top, over: others.filter((other) => other.width > 0 && left < other.right && other.left < right && top < other.bottom && other.top < bottom).map(({ name }) => name) };
+      });
+      await page.evaluate(() => document.getElementById('notices')!.replaceChildren());
+      expect(over).toEqual([]);
+      expect(covered.top).toBeGreaterThanOrEqual(0);
+      expect(covered.over).toEqual([]);
+    });
+  });
+
+  describe.each(['light', 'dark'])('in the %s', (theme) => {
+    beforeAll(async () => {
+      await page.setViewportSize({ width: 390, height: 844 });
+      if ((await page.evaluate(() => document.body.dataset.theme)) !== theme) await page.click('.theme');
+      await page.evaluate(() => window.ico3d!.stage.orbit.show('half'));
+      await page.waitForFunction(() => document.querySelector<HTMLCanvasElement>('#stage')!.width === 390);
+      await refreshed(page);
+    });
+
+    test('the note under the text box is read on her clothes, too', async () => {
+      const contrast = await page.evaluate(async () => {
+        const note = document.getElementById('stand-ins')!;
+        const numbers = (colour: string) => colour.match(/[\d.]+/g)!.map(Number);
+        const luminance = (rgb: readonly number[]) =>
+          [0.2126, 0.7152, 0.0722].reduce((sum, share, c) => sum + share * (rgb[c]! <= 10 ? rgb[c]! / 255 / 12.92 : ((rgb[c]! / 255 + 0.055) / 1.055) ** 2.4), 0);
+        const { color, backgroundColor } = getComputedStyle(note);
+        const [red, green, blue, veil = 1] = numbers(backgroundColor);
+        const ink = luminance(numbers(color));
+        await window.ico3d!.stage.still();
+        const canvas = document.querySelector<HTMLCanvasElement>('#stage')!;
+        const { left, top, width, height } = note.getBoundingClientRect();
+        const { data } = canvas.getContext('2d')!.getImageData(left, top, width, height);
+        window.ico3d!.stage.start();
+        let worst = Infinity;
+        for (let i = 0; i < data.length; i += 4) {
+          const behind = luminance([red!, green!, blue!].map((value, c) => veil * value + (1 - veil) * data[i + c]!));
+          worst = Math.min(worst, (Math.max(ink, behind) + 0.05) / (Math.min(ink, behind) + 0.05));
+        }
+        return worst;
+      });
+      if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `note-${theme}.png`) });
+      expect(contrast).toBeGreaterThanOrEqual(4.5);
     });
   });
 });

@@ -8,6 +8,7 @@ export class Captions {
   private readonly root: HTMLElement;
   private readonly asked: HTMLElement;
   private readonly answered: HTMLElement;
+  private readonly cut: HTMLElement; // tells that the answer began above what is seen of it
   private readonly heardWords = document.createElement('span');
   private readonly nextWords = document.createElement('span'); // keep their place, so that no line jumps
   private readonly sentence = new RunningSentence();
@@ -21,6 +22,7 @@ export class Captions {
     this.root = byId(root, 'captions');
     this.asked = byId(root, 'question');
     this.answered = byId(root, 'answer');
+    this.cut = byId(root, 'cut');
     this.root.lang = lang;
     this.nextWords.className = 'unheard';
     this.answered.append(this.heardWords, this.nextWords);
@@ -62,8 +64,9 @@ export class Captions {
 
   /** The present line is the last one seen. */
   private scroll(): void {
-    const { answered, nextWords } = this;
+    const { answered, nextWords, cut } = this;
     const line = parseFloat(getComputedStyle(answered).lineHeight);
     answered.scrollTop = nextWords.offsetTop + line - answered.clientHeight;
+    cut.hidden = answered.scrollTop < 1;
   }
 }
