@@ -222,6 +222,41 @@ test('the floating one is worked with the keyboard alone', async () => {
   await browser.close();
 });
 
+test('the floating one shows the question and four lines of the answer', async () => {
+  const { browser, page } = await visit('/example');
+  await page.setViewportSize({ width: 1280, height: 800 });
+  await page.locator('#launcher').click();
+  await heard(page, 'speak-end', { utterance: 0 });
+  await page.locator('#text').fill('Who are you?');
+  await page.keyboard.press('Enter');
+  await heard(page, 'speak-end', { utterance: 1 });
+  const asked = await page.locator('#question').boundingBox();
+  const lines = await page.locator('#answer').evaluate((answer) => {
+    answer.firstElementChild!.textContent = 'Words that fill a line, and then another one. '.repeat(8);
+    return answer.clientHeight / parseFloat(getComputedStyle(answer).lineHeight);
+  });
+  expect(asked!.height).toBeGreaterThan(10);
+  expect(lines).toBeCloseTo(4, 1);
+  await browser.close();
+});
+
+test('an inline one begins light or dark, as it goes on, and as the visitor’s system is', async () => {
+  const { browser, page } = await visit('/french');
+  const avatar = page.locator('ico3d-avatar').first();
+  const theme = () => avatar.locator('#page').getAttribute('data-theme');
+  const veil = () => avatar.locator('#overlay').evaluate((overlay) => getComputedStyle(overlay).backgroundColor.match(/[\d.]+/g)!.map(Number)[0]!);
+  await avatar.locator('#choices').waitFor();
+  expect([await theme(), (await veil()) > 200]).toEqual(['light', true]);
+  await page.emulateMedia({ colorScheme: 'dark' });
+  await expect.poll(theme).toBe('dark');
+  expect(await veil()).toBeLessThan(60);
+  await page.emulateMedia({ colorScheme: 'light' });
+  await avatar.locator('#start-typing').click();
+  await heard(page, 'ready');
+  expect(await theme()).toBe('light');
+  await browser.close();
+});
+
 test('around a transparent one the page is seen, through the edges of Gaussians too', async () => {
   const { browser, page } = await visit('/clear');
   await heard(page, 'ready');

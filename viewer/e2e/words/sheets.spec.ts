@@ -116,6 +116,38 @@ describe('every sheet', () => {
   });
 });
 
+test('a picture that was clicked has no frame, one that the keyboard has reached has', async () => {
+  await page.setViewportSize({ width: 1280, height: 720 });
+  const frame = () => page.locator('#stage').evaluate((stage) => getComputedStyle(stage).outlineStyle);
+  await page.mouse.click(300, 300);
+  await page.keyboard.press('ArrowLeft');
+  expect([await focused(), await frame()]).toEqual(['stage', 'none']);
+  await page.keyboard.press('Tab');
+  await page.keyboard.press('Shift+Tab');
+  expect([await focused(), await frame()]).toEqual(['stage', 'solid']);
+  await page.keyboard.press('Home');
+});
+
+test.each([
+  [352, 476],
+  [352, 516],
+  [320, 440],
+])('nothing lies over a sheet in a frame of %i × %i on another page', async (width, height) => {
+  await page.setViewportSize({ width, height });
+  for (const sheet of ['panel', 'settings']) {
+    await page.click(`#${sheet}-button`);
+    if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `${sheet}-${width}x${height}.png`) });
+    const over = await page.locator(`#${sheet}`).evaluate((part) => {
+      const { left, top, width, height } = part.getBoundingClientRect();
+      const shares = Array.from({ length: 19 }, (_, i) => (i + 1) / 20);
+      const found = shares.flatMap((x) => shares.map((y) => document.elementFromPoint(left + x * width, top + y * height)!));
+      return [...new Set(found.filter((element) => !part.contains(element)).map(({ outerHTML }) => outerHTML.slice(0, 80)))];
+    });
+    await page.click(`#${sheet} .close`);
+    expect(over).toEqual([]);
+  }
+});
+
 describe.each(PHONES)('on a phone of %i × %i', (width, height) => {
   test.each(SHEETS)('%s leaves the face and its own ✕ in sight', async (sheet) => {
     await page.setViewportSize({ width, height });

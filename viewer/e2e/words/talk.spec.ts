@@ -110,11 +110,38 @@ describe('an answer', () => {
       const { scrollTop, clientHeight, scrollHeight } = document.getElementById('answer')!;
       return { more: scrollHeight > clientHeight + 1, left: Math.round(scrollHeight - clientHeight - scrollTop) };
     });
-    await page.evaluate(() => (document.querySelector('#answer span')!.textContent = 'Words that fill lines, and more of them. '.repeat(4)));
+    await page.evaluate(() => (document.querySelector('#answer span')!.textContent = 'Words that fill lines, and more of them. '.repeat(8)));
     await page.setViewportSize({ width: 844, height: 390 });
     await expect.poll(atEnd).toEqual({ more: true, left: 0 });
-    await page.setViewportSize({ width: 1280, height: 720 });
+    const mark = await page.locator('#cut').evaluate((cut) => {
+      const [sign, answer, captions] = [cut, cut.nextElementSibling!, cut.parentElement!].map((element) => element.getBoundingClientRect());
+      return { text: cut.textContent, above: answer!.top - sign!.top, shown: cut.getClientRects().length, inside: sign!.left >= captions!.left };
+    });
+    expect(mark).toEqual({ text: '…', above: 0, shown: 1, inside: true }); // before the first line that is seen
     await page.evaluate((text) => (document.querySelector('#answer span')!.textContent = text), before);
+    await page.setViewportSize({ width: 1280, height: 720 });
+    await page.waitForSelector('#cut', { state: 'hidden' });
+  });
+
+  test.each([
+    [1280, 800, 'large'],
+    [844, 390, ''],
+    [390, 844, ''],
+  ])('of some sentences is seen from its first word on in %i × %i (%s)', async (width, height, size) => {
+    const { page } = browser;
+    const before = await page.textContent('#answer');
+    await page.evaluate((size) => {
+      document.documentElement.dataset.captionsSize = size;
+      document.querySelector('#answer span')!.textContent = 'I do not know that. You can ask me, for example: “who are you”, or “are you real”, or “what is ico3d”.';
+    }, size);
+    await page.setViewportSize({ width, height });
+    const hidden = await page.locator('#answer').evaluate(({ clientHeight, scrollHeight }) => scrollHeight - clientHeight);
+    await page.evaluate((text) => {
+      delete document.documentElement.dataset.captionsSize;
+      document.querySelector('#answer span')!.textContent = text;
+    }, before);
+    await page.setViewportSize({ width: 1280, height: 720 });
+    expect(hidden).toBeLessThanOrEqual(1);
   });
 
   test.each(['', 'small', 'large'])('shows whole lines, the last one among them (%s)', async (size) => {
@@ -124,7 +151,7 @@ describe('an answer', () => {
       const answer = document.getElementById('answer')!;
       const [heard, next] = answer.children;
       const before = heard!.textContent;
-      heard!.textContent = 'Words that fill a line, and then another one, and more of them. '.repeat(8);
+      heard!.textContent = 'Words that fill a line, and then another one, and more of them. '.repeat(30);
       const { clientHeight, scrollHeight } = answer;
       answer.scrollTop = scrollHeight;
       const line = parseFloat(getComputedStyle(answer).lineHeight);
@@ -133,7 +160,18 @@ describe('an answer', () => {
       return { lines: clientHeight / line, more: scrollHeight > clientHeight, next: next!.textContent };
     }, size);
     expect(shown).toMatchObject({ more: true, next: '' });
-    expect(Math.abs(shown.lines - 4)).toBeLessThan(0.05);
+    expect(Math.abs(shown.lines - Math.round(shown.lines))).toBeLessThan(0.05);
+    expect(shown.lines).toBeGreaterThan(3.9);
+  });
+
+  test.each(['mouse', 'keyboard'])('that is stopped with the button (%s) leaves the focus in the text box', async (by) => {
+    const { page } = browser;
+    await ask(SENTENCE);
+    await page.waitForSelector('#stop:not(.gone)');
+    if (by === 'mouse') await page.click('#stop');
+    else await page.press('#stop', 'Enter');
+    await page.waitForSelector('#stop.gone', { state: 'attached' });
+    expect(await page.evaluate(() => document.activeElement!.id)).toBe('text');
   });
 });
 

@@ -7,6 +7,7 @@ import { focusOn } from '../ui/elements.ts';
 import { icon } from '../ui/icons.ts';
 import { codeOf, english, say, type Sentence } from '../words/text.ts';
 import { Overlay, type Choice } from '../ui/overlay.ts';
+import { followTheme, showTheme } from '../ui/theme.ts';
 import type { Presence, Visit } from '../visit.ts';
 import { xrSettings } from '../xr/settings.ts';
 import { buildShell, fillPage, type Shell } from './shell.ts';
@@ -145,6 +146,7 @@ export class AvatarElement extends HTMLElement {
   private async invite(): Promise<void> {
     const { signal } = (this.invitation = new AbortController());
     this.refill();
+    followTheme(this.shell.page, () => {}, signal);
     const overlay = new Overlay(this.shell.page, this.shell.words, signal, () => this.disconnect());
     try {
       const server = await this.reach(signal);
@@ -184,6 +186,7 @@ export class AvatarElement extends HTMLElement {
     const talk: Talk = { ending: new AbortController(), ready: Promise.resolve() };
     this.talk = talk;
     this.refill();
+    showTheme(this.shell.page); // what draws is still to be fetched
     this.show(true);
     talk.ready = this.open(talk, choice);
     return talk.ready;

@@ -125,6 +125,11 @@ export class Controls {
     focusOn(this.input);
   }
 
+  /** Where a visitor goes on who stopped an answer; with fingers, the text box would open a keyboard over the avatar. */
+  private next(): HTMLElement {
+    return matchMedia('(pointer: coarse)').matches ? this.microphone : this.input;
+  }
+
   /** Whether a slash leads to the text box: everywhere but inside a text that is being typed. */
   private takesSlash({ target, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean {
     if (ctrlKey || metaKey || altKey) return false;
@@ -143,6 +148,7 @@ export class Controls {
   }
 
   setSpeaking(speaking: boolean): void {
+    if (!speaking && this.stop.matches(':focus')) this.next().focus({ preventScroll: true }); // before it can have none
     this.stop.classList.toggle('gone', !speaking);
     this.stop.inert = !speaking;
   }

@@ -7,6 +7,7 @@ import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
 import { Overlay } from './overlay.ts';
+import { markPressed } from './pressed.ts';
 import { Memory } from './sheets/memory.ts';
 import { Panel } from './sheets/panel.ts';
 import { Settings } from './sheets/settings.ts';
@@ -36,6 +37,7 @@ export function makePage(
   figures: () => Figures,
   signal: AbortSignal,
 ): Page {
+  markPressed(byId(root, 'stage'), signal);
   const captions = new Captions(root, talker.languages[0] ?? '', signal);
   const controls = new Controls(root, words, talker.languages, signal);
   const panel = new Panel(root, words, figures, signal);
