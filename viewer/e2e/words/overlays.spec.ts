@@ -95,25 +95,38 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       expect(Math.abs(lines - Math.round(lines))).toBeLessThan(0.05);
     });
 
-    test.runIf(height < 480).each(VIEWS)('has a notice beside her in the view %s, over nothing else', async (view) => {
-      await page.evaluate(([view, text]) => {
-        window.ico3d!.stage.orbit.show(view);
-        document.getElementById('notices')!.replaceChildren(Object.assign(document.createElement('p'), { textContent: text }));
-      }, [view, NOTICE] as const);
-      const { over } = await overHead(page, '#notices p');
-      if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `notice-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`) });
-      const covered = await page.evaluate(() => {
-        const [notice, ...others] = ['#notices p', '#captions', '#stop', '#composer', '#state', ...document.querySelectorAll('header button')].map((part) => {
-          const element = typeof part === 'string' ? document.querySelector(part)! : part;
-          return { name: element.id || element.textContent, ...(element.getBoundingClientRect().toJSON() as DOMRect) };
-        });
-        const { left, top, right, bottom } = notice!;
-        return { top, over: others.filter((other) => other.width > 0 && left < other.right && other.left < right && top < other.bottom && other.top < bottom).map(({ name }) => name) };
+    describe.runIf(height < 480).each([
+      ['a notice', '#notices p'],
+      ['what asks the visitor', '#memory-ask'],
+      ['that the sound was interrupted', '#silenced'],
+    ])('%s', (_, what) => {
+      beforeAll(() =>
+        page.evaluate(([what, text]) => {
+          if (what === '#notices p') document.getElementById('notices')!.append(Object.assign(document.createElement('p'), { textContent: text }));
+          else document.querySelector<HTMLElement>(what)!.hidden = false;
+        }, [what, NOTICE] as const),
+      );
+
+      afterAll(() =>
+        page.evaluate((what) => {
+          document.getElementById('notices')!.replaceChildren();
+          if (what !== '#notices p') document.querySelector<HTMLElement>(what)!.hidden = true;
+        }, what),
+      );
+
+      test.each(VIEWS)('is beside her in the view %s, over nothing else', async (view) => {
+        await page.evaluate((view) => window.ico3d!.stage.orbit.show(view), view);
+        const { over } = await overHead(page, what);
+        if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `${what.slice(1, 7)}-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`) });
+        const { top, covered } = await page.evaluate((what) => {
+          const { left, top, right, bottom } = document.querySelector(what)!.getBoundingClientRect();
+          const others = document.querySelectorAll<HTMLElement>('#captions, #stop, #composer, #name, #state, header button');
+          const isUnder = (other: DOMRect) => other.width > 0 && left < other.right && other.left < right && top < other.bottom && other.top < bottom;
+          return { top, covered: [...others].filter((other) => isUnder(other.getBoundingClientRect())).map(({ id, title }) => id || title) };
+        }, what);
+        expect([over, covered]).toEqual([[], []]);
+        expect(top).toBeGreaterThanOrEqual(0);
       });
-      await page.evaluate(() => document.getElementById('notices')!.replaceChildren());
-      expect(over).toEqual([]);
-      expect(covered.top).toBeGreaterThanOrEqual(0);
-      expect(covered.over).toEqual([]);
     });
   });
 
