@@ -71,10 +71,13 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       expect(over).toEqual([]);
     });
 
-    test('does not cover one another, and is all in the picture', async () => {
+    test.each(width > height ? ['', 'large'] : [''])('does not cover one another, and is all in the picture (captions: %s)', async (size) => {
+      await page.evaluate((size) => void (document.documentElement.dataset.captionsSize = size), size);
+      await refreshed(page);
       const boxes = await page.$$eval('header button, #name, #state, #captions, #stop, #composer', (parts) =>
         parts.map((part) => ({ name: part.id || (part as HTMLElement).title, ...(part.getBoundingClientRect().toJSON() as DOMRect) })).filter(({ width }) => width > 0),
       );
+      await page.evaluate(() => delete document.documentElement.dataset.captionsSize);
       const views = height > 256 ? VIEWS.length : 0; // over a keyboard there is no room for their buttons
       expect(boxes.length).toBe(10 + views + (headsets ? 2 : 0));
       for (const [i, a] of boxes.entries()) {
