@@ -241,6 +241,12 @@ describe('a talk by headset', () => {
     expect(talk).toContain('Somewhere in');
     expect(talk).not.toContain('the stars'); // that was not heard yet
     expect(talk).toContain('Hold the trigger to talk.');
+    const both = await page.evaluate(() => {
+      document.getElementById('line')!.textContent = 'This device or the line is too slow just now.';
+      return new Promise<string>((resolve) => setTimeout(() => resolve(window.immersion().board.text)));
+    });
+    expect(both).toMatch(/^This device or the line is too slow just now\.\n[^]*Somewhere in/); // above what she says, not instead of it
+    await page.evaluate(() => void (document.getElementById('line')!.textContent = ''));
     for (const height of [0.7, 1.5, 2]) {
       await page.evaluate((y) => void (window.headset.position.y = y), height);
       await drawn(page, 2);

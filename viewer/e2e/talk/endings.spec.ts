@@ -106,6 +106,35 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
   expect(await pressed(first)).toBe('false');
 }, 300_000);
 
+test('a server that is gone is told of, and what was typed stays; back again, no old question stands over the new greeting', async () => {
+  const server = await ChatServer.start(talking);
+  opened.push({ close: () => server.stop() });
+  const browser = await visit(server.url);
+  const { page } = browser;
+  await page.fill('#text', 'Who are you?');
+  await page.keyboard.press('Enter');
+  await until(browser, ({ received }) => received.some(({ text }) => text === 'I am Stella.'), 30_000);
+  await page.click('#microphone');
+  await page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
+
+  await server.kill();
+  await page.waitForSelector('#line:visible', { timeout: 3000 * slowness() });
+  expect(await page.textContent('#line')).toBe('There is no connection to the server; trying again …');
+  expect(await pressed(browser)).toBe('false');
+  expect(await page.getAttribute('#microphone', 'title')).toMatch(/^The microphone waits for the connection/);
+  expect(await page.getAttribute('#send', 'aria-disabled')).toBe('true');
+  await page.fill('#text', 'Are you there?');
+  await page.keyboard.press('Enter');
+  expect(await page.textContent('#notices')).toMatch(/^There is no connection just now: your question stays here/);
+
+  const next = await ChatServer.start(talking, Number(new URL(server.url).port));
+  opened.push({ close: () => next.stop() });
+  await page.waitForSelector('#line', { state: 'hidden', timeout: 60_000 });
+  expect([await page.textContent('#question'), await page.inputValue('#text')]).toEqual(['', 'Are you there?']);
+  expect(await page.textContent('#notices')).toContain('The microphone is off now: turn it on to speak.');
+  expect([await pressed(browser), await page.getAttribute('#send', 'aria-disabled')]).toEqual(['false', 'false']);
+});
+
 test('a microphone whose worklet does not load is shown as closed, and is', async () => {
   const browser = await visit(talkingUrl);
   const { page } = browser;

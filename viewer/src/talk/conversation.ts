@@ -36,8 +36,11 @@ export interface Acting {
 
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 
-const STALLED = say('stalled');
 const REPLACED = say('replaced');
+const OFF = say('microphone.off');
+
+/** How what is said gets to the server: it does, it is too slow for all of it, or not at all. */
+export type Line = 'up' | 'slow' | 'lost';
 
 /** What the page shows of a conversation. */
 export interface ConversationView extends VoiceView, CaptionEvents {
@@ -51,6 +54,7 @@ export interface ConversationView extends VoiceView, CaptionEvents {
   metrics(name: string, values: Record<string, number>): void;
   /** The visitor waits in the server's queue. */
   queued(place: PlaceMessage): void;
+  line(line: Line): void;
   /** The system has stopped the sound until the visitor taps or types, or it goes on. */
   silenced(silent: boolean): void;
   /** A session has begun, or one goes on. */
@@ -109,6 +113,7 @@ export class Conversation {
   };
   private state: StateMessage['state'] = 'idle'; // of the server
   private up = false; // a session is going on
+  private shut = false; // the microphone, because a session was over
   private readonly wake: WakeLock;
   private readonly ending = new AbortController();
   private readonly reporting: ReturnType<typeof setInterval>;
@@ -125,8 +130,8 @@ export class Conversation {
       message: (message) => handle(message, this.handlers),
       welcome: (message, replaced) => this.welcome(message, replaced),
       queued: (place) => this.queued(place),
-      lost: () => view.state('connecting'),
-      stalled: (stalls) => this.stalled(stalls),
+      lost: () => this.lost(),
+      stalled: (stalls) => view.line(stalls ? 'slow' : 'up'),
       ended: (ending) => this.ended(ending),
     });
     const send = this.connection.send.bind(this.connection);
@@ -244,10 +249,14 @@ export class Conversation {
   private welcome(message: WelcomeMessage, replaced: boolean): void {
     if (!message.resumed) this.silence();
     if (replaced) {
+      this.shut = this.voice.isOpen;
       this.voice.close(); // what is said was meant for somebody who knew what was said before
       this.view.notice(REPLACED);
     }
+    if (this.shut) this.view.notice(OFF);
+    this.shut = false;
     this.up = true;
+    this.view.line('up');
     this.voice.welcome(message);
     this.view.connected(message.resumed);
     this.view.services(message.services, message.offers);
@@ -260,17 +269,19 @@ export class Conversation {
 
   private queued(place: PlaceMessage): void {
     this.close(); // of a session of before; nobody listens yet
+    this.view.line('up');
     this.view.state('queued');
     this.view.queued(place);
   }
 
-  private stalled(stalls: boolean): void {
-    this.view.state(stalls ? 'connecting' : this.state);
-    if (stalls) this.view.notice(STALLED);
+  private lost(): void {
+    this.view.line('lost');
+    this.view.state('connecting');
   }
 
   private ended(ending: Ending): void {
     this.close();
+    this.view.line('up'); // the ending says what there is to say
     this.view.state('ended');
     this.view.ended(ending);
   }
@@ -299,6 +310,7 @@ export class Conversation {
   /** The session is over. */
   private close(): void {
     this.up = false;
+    this.shut ||= this.voice.isOpen;
     this.voice.end();
     this.silence();
     this.settleWake();

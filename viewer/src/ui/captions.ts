@@ -56,6 +56,14 @@ export class Captions {
     this.write(said, '');
   }
 
+  /** Nothing is said any more: what was said belongs to another talk. */
+  clear(): void {
+    this.utterance = null;
+    this.asked.textContent = '';
+    this.write('', '');
+    this.root.hidden = true;
+  }
+
   private write(heard: string, next: string): void {
     this.heardWords.textContent = heard;
     this.nextWords.textContent = next;

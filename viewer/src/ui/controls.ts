@@ -21,6 +21,9 @@ export class Controls {
   private readonly talk: HTMLButtonElement;
   private readonly stop: HTMLButtonElement;
   private readonly mute: HTMLButtonElement;
+  private readonly send: HTMLButtonElement;
+  private opened: MicrophoneState = 'closed';
+  private connected = true;
 
   /**
    * @param root what keys are heard in
@@ -40,7 +43,8 @@ export class Controls {
     this.microphone.append(icon('microphone'));
     this.talk.append(icon('talk'));
     this.stop.prepend(icon('stop'));
-    byId(root, 'send').append(icon('send'));
+    this.send = byId(root, 'send');
+    this.send.append(icon('send'));
     const ask = () => words.write(this.input, askIn(foreignTo(words.language, languages)), 'placeholder');
     words.onChange(ask, signal);
     ask();
@@ -53,7 +57,9 @@ export class Controls {
     this.form.onsubmit = (event) => {
       event.preventDefault();
       const text = this.input.value.trim();
-      if (text && conversation.ask(text)) this.input.value = '';
+      if (!text) return;
+      if (conversation.ask(text)) this.input.value = '';
+      else notice(say('ask.kept'));
     };
     this.microphone.onclick = () => void conversation.toggleMicrophone();
     this.stop.onclick = () => conversation.interrupt();
@@ -142,8 +148,21 @@ export class Controls {
   }
 
   setMicrophone(state: MicrophoneState): void {
+    this.opened = state;
+    this.showMicrophone();
+  }
+
+  /** Whether anything gets to the server; while nothing does, the microphone waits, and what is typed stays. */
+  setConnected(connected: boolean): void {
+    this.connected = connected;
+    this.send.setAttribute('aria-disabled', String(!connected));
+    this.showMicrophone();
+  }
+
+  private showMicrophone(): void {
+    const state = this.connected || this.opened === 'closed' ? this.opened : 'waiting';
     this.microphone.setAttribute('aria-pressed', String(state === 'open'));
-    this.microphone.setAttribute('aria-busy', String(state === 'opening'));
+    this.microphone.setAttribute('aria-busy', String(state === 'opening' || state === 'waiting'));
     this.words.write(this.microphone, say(`microphone.${state}`), 'title');
   }
 

@@ -4,6 +4,7 @@ import { byId } from './elements.ts';
 const MUCH = 0.1; // of the picture's height, which is a gap when it stays free
 const CALM = 4000; // ms for which it does
 const PASSING = new Set(['captions', 'stop', 'silenced']); // what comes and goes with what is said
+const OVER = new Set(['notices', 'line']); // what lies over the picture for a while, and moves nobody
 const SETTLING = 1000; // ms after a change of the picture's size, in which all finds its place
 
 /**
@@ -48,5 +49,5 @@ export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixe
 function isCover(element: Element): boolean {
   const { width, height } = element.getBoundingClientRect();
   const seen = width > 0 && height > 0 && !element.matches('.gone');
-  return seen && element.id !== 'notices' && getComputedStyle(element).position !== 'fixed';
+  return seen && !OVER.has(element.id) && getComputedStyle(element).position !== 'fixed';
 }

@@ -6,6 +6,7 @@ import { say, type Sentence } from '../words/text.ts';
 import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
+import { LineNotice } from './line.ts';
 import { Overlay } from './overlay.ts';
 import { markPressed } from './pressed.ts';
 import { Memory } from './sheets/memory.ts';
@@ -40,6 +41,7 @@ export function makePage(
   markPressed(byId(root, 'stage'), signal);
   const captions = new Captions(root, talker.languages[0] ?? '', signal);
   const controls = new Controls(root, words, talker.languages, signal);
+  const line = new LineNotice(root, words, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
   const memory = new Memory(root, words, talker.home);
@@ -98,8 +100,13 @@ export function makePage(
     metrics: (name, values) => panel.metrics(name, values),
     silenced: (silent) => (byId(root, 'silenced').hidden = !silent),
     queued: (place) => overlay.queue(place),
+    line(state) {
+      line.show(state);
+      controls.setConnected(state !== 'lost');
+    },
     connected(resumed) {
       isNew = !resumed;
+      if (isNew) captions.clear();
       transcript.record.begin(resumed);
       if (!overlay.isShown) return;
       overlay.hide();

@@ -8,6 +8,7 @@ const LETTERS = 42; // pixels
 const LINE = 54;
 const EDGE = 36;
 const MOST_LINES = Math.floor((HEIGHT - EDGE) / LINE);
+const MOST_TOLD = 3; // lines of a notice: captions have the rest
 const WIDE = 0.6; // m, of the board at 1 m
 const UNDER = 0.03; // m at 1 m: between the chin and the board
 const NEARER = 0.75; // of the way from the visitor to the face
@@ -22,7 +23,7 @@ interface Said {
 }
 
 /**
- * The page's captions and notices in space: right below the face as the visitor sees it, from
+ * The page's notices, and its captions under them, in space: right below the face as the visitor sees it, from
  * wherever that is, turned to them and of the same apparent size.
  */
 export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial> {
@@ -47,7 +48,7 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     this.texture = texture;
     this.renderOrder = 1; // over the Gaussians
     [canvas.width, canvas.height] = [WIDTH, HEIGHT];
-    for (const id of ['captions', 'notices', 'state']) {
+    for (const id of ['captions', 'notices', 'line', 'state']) {
       this.observer.observe(byId(page, id), { subtree: true, childList: true, characterData: true, attributes: true });
     }
     this.write();
@@ -87,15 +88,19 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   }
 
   private write(): void {
-    const texts = this.read();
-    this.text = texts.map(({ text, seen }) => text.slice(0, seen)).join('\n');
+    const [told, said] = this.read();
+    this.text = [...told, ...said].map(({ text, seen }) => text.slice(0, seen)).join('\n');
     const context = this.canvas.getContext('2d')!;
     context.font = `${LETTERS}px system-ui, sans-serif`;
     const width = (text: string) => context.measureText(text).width;
-    const lines = texts.flatMap((said) => seenLines(said, linesOf(said.text, WIDTH - 2 * EDGE, width)));
-    const end = Math.max(MOST_LINES, 1 + lines.findLastIndex(({ seen }) => seen > 0));
-    paint(context, lines.slice(Math.max(0, end - MOST_LINES), end));
-    this.visible = lines.length > 0;
+    const inLines = (texts: Said[]) => texts.flatMap((one) => seenLines(one, linesOf(one.text, WIDTH - 2 * EDGE, width)));
+    const above = inLines(told).slice(0, MOST_TOLD);
+    const lines = inLines(said);
+    const room = MOST_LINES - above.length;
+    const end = Math.max(room, 1 + lines.findLastIndex(({ seen }) => seen > 0));
+    const shown = [...above, ...lines.slice(Math.max(0, end - room), end)];
+    paint(context, shown);
+    this.visible = shown.length > 0;
     this.texture.needsUpdate = true;
   }
 
@@ -106,13 +111,13 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     return TOLD.includes(name) ? state.textContent! : '';
   }
 
-  /** What the page says now: a notice, else the captions and who listens; and the hint. */
-  private read(): Said[] {
-    const [captions, notices] = [byId(this.page, 'captions'), byId(this.page, 'notices')];
-    const notice = notices.lastElementChild?.textContent;
+  /** What the page says now: a notice, which stands above; the captions, who listens, and the hint. */
+  private read(): [told: Said[], said: Said[]] {
+    const [captions, notices, line] = [byId(this.page, 'captions'), byId(this.page, 'notices'), byId(this.page, 'line')];
+    const notice = notices.lastElementChild?.textContent ?? line.textContent!;
     const shown = captions.checkVisibility() ? [said(byId(captions, 'question'), false), said(byId(captions, 'answer'), true)] : [];
-    const texts = notice ? [whole(notice, true)] : [...shown, whole(this.state(), false)];
-    return [...texts, whole(this.way || this.hint, false)].filter(({ text }) => text);
+    const talk = [...shown, whole(this.state(), false), whole(this.way || this.hint, false)];
+    return [[whole(notice, false)], talk].map((texts) => texts.filter(({ text }) => text)) as [Said[], Said[]];
   }
 }
 

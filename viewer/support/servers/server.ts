@@ -40,9 +40,14 @@ export class ChatServer {
     return new ChatServer(child, await readUrl(child));
   }
 
-  async stop(): Promise<void> {
-    this.child.kill('SIGINT');
-    if (this.child.exitCode === null) await once(this.child, 'exit');
+  /** Ends it without a word, as the system does that has no memory left. */
+  kill(): Promise<void> {
+    return this.stop('SIGKILL');
+  }
+
+  async stop(signal: NodeJS.Signals = 'SIGINT'): Promise<void> {
+    this.child.kill(signal);
+    if (this.child.exitCode === null && this.child.signalCode === null) await once(this.child, 'exit');
   }
 }
 

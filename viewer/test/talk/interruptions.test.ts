@@ -10,6 +10,7 @@ let audio: ScriptedAudio;
 let shown: string[]; // of the microphone
 let notices: string[];
 let silenced: boolean[];
+let lines: string[];
 let conversation: Conversation;
 
 beforeEach(async () => {
@@ -18,11 +19,12 @@ beforeEach(async () => {
   vi.stubGlobal('window', globalThis);
   vi.stubGlobal('WebSocket', ScriptedSocket);
   for (const [name, value] of Object.entries(audio.globals)) vi.stubGlobal(name, value);
-  [shown, notices, silenced] = [[], [], []];
+  [shown, notices, silenced, lines] = [[], [], [], []];
   const view: Partial<ConversationView> = {
     microphone: (state) => shown.push(state),
     notice: (sentence) => notices.push(english(sentence)),
     silenced: (silent) => silenced.push(silent),
+    line: (line) => lines.push(line),
   };
   const others = { get: (known: object, name: string) => Reflect.get(known, name) ?? (() => {}) };
   conversation = new Conversation(() => 'ws://server/ws', new Proxy(view, others) as ConversationView);
@@ -122,6 +124,39 @@ describe('a microphone that was lost', () => {
     unplug();
     await pass(5000);
     expect([audio.prompts.length, audio.records]).toEqual([1, false]);
+  });
+});
+
+describe('a server that is gone', () => {
+  const OFF = 'The microphone is off now: turn it on to speak.';
+
+  test('is told of as long as it is, and typed questions are not taken', async () => {
+    ScriptedSocket.last.drop();
+    expect([lines.at(-1), conversation.ask('Are you there?')]).toEqual(['lost', false]);
+    await pass(300);
+    ScriptedSocket.last.welcome({ resumed: true });
+    expect([lines.at(-1), conversation.ask('Are you there?')]).toEqual(['up', true]);
+  });
+
+  test.each([
+    ['that knows nobody any more', async () => void (await pass(300))],
+    ['after so long that the session is over', async () => {
+      for (let passed = 0; passed < 45_000; passed += 5000) {
+        if (!ScriptedSocket.last.closed) ScriptedSocket.last.drop();
+        await pass(5000);
+      }
+    }],
+  ])('and comes back %s finds the microphone off, and the page says so', async (_, happens) => {
+    await open();
+    ScriptedSocket.last.drop();
+    await happens();
+    while (ScriptedSocket.last.closed) await pass(1000);
+    ScriptedSocket.last.welcome({ session: 'second' });
+    expect([shown.at(-1), notices.at(-1), lines.at(-1)]).toEqual(['closed', OFF, 'up']);
+    ScriptedSocket.last.drop();
+    await pass(300);
+    ScriptedSocket.last.welcome({ session: 'third' });
+    expect(notices.filter((notice) => notice === OFF)).toHaveLength(1); // it was off already
   });
 });
 

@@ -4,10 +4,13 @@ import { ScriptedAudio, STEPS } from '../../support/doubles/scripted-microphone.
 import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
 import { english } from '../../src/words/text.ts';
 
+const OFF = 'The microphone is off now: turn it on to speak.';
+
 let audio: ScriptedAudio;
 let shown: string[]; // of the microphone
 let notices: string[];
 let talking: boolean;
+let lines: string[];
 let conversation: Conversation;
 
 beforeEach(() => {
@@ -16,11 +19,12 @@ beforeEach(() => {
   vi.stubGlobal('window', globalThis);
   vi.stubGlobal('WebSocket', ScriptedSocket);
   for (const [name, value] of Object.entries(audio.globals)) vi.stubGlobal(name, value);
-  [shown, notices, talking] = [[], [], false];
+  [shown, notices, talking, lines] = [[], [], false, []];
   const view: Partial<ConversationView> = {
     microphone: (state) => shown.push(state),
     talking: (held) => (talking = held),
     notice: (sentence) => notices.push(english(sentence)),
+    line: (line) => lines.push(line),
   };
   const others = { get: (known: object, name: string) => Reflect.get(known, name) ?? (() => {}) };
   conversation = new Conversation(() => 'ws://server/ws', new Proxy(view, others) as ConversationView);
@@ -241,7 +245,7 @@ describe('when the session ends', () => {
     audio.sounds();
     await pass();
     expect([shown.at(-1), audio.streams.map(({ tracks }) => tracks[0]!.readyState)]).toEqual(['open', ['ended', 'live']]);
-    expect(notices).toEqual([]);
+    expect(notices).toEqual([OFF]);
   });
 
   test('another one that takes its place finds the microphone closed', async () => {
@@ -251,7 +255,7 @@ describe('when the session ends', () => {
     expect(audio.records).toBe(true); // it may be resumed
     ScriptedSocket.last.welcome({ session: 'second' });
     expect([shown.at(-1), audio.records]).toEqual(['closed', false]);
-    expect(notices).toEqual(['The conversation of before is over; a new one begins.']);
+    expect(notices).toEqual(['The conversation of before is over; a new one begins.', OFF]);
   });
 });
 
@@ -279,5 +283,7 @@ test('a release that was lost with the line is told again', async () => {
 test('the page says when the network loses what is said', async () => {
   await open();
   await sound(3000, false);
-  expect(notices).toEqual(['The network has stalled: what you say now may not be heard.']);
+  expect([lines.at(-1), notices]).toEqual(['slow', []]);
+  ScriptedSocket.last.says({ type: 'ack', frames: 1 });
+  expect(lines.at(-1)).toBe('up');
 });

@@ -81,7 +81,7 @@ describe('a sentence', () => {
 
   test('of somebody else stays as it is, and a value that is missing is no secret', () => {
     expect(textOf('Fin de la file.', 'de')).toBe('Fin de la file.');
-    expect([codeOf('Fin.'), codeOf(say('stalled'))]).toEqual(['', 'stalled']);
+    expect([codeOf('Fin.'), codeOf(say('replaced'))]).toEqual(['', 'replaced']);
     expect(() => english(say('queue.place'))).toThrow('lacks one of its values');
     expect(english({ key: 'server.voiceless', english: 'Its voice is gone (no sound).' })).toBe('Its voice is gone (no sound).');
     expect(textOf({ key: 'server.voiceless', english: 'Gone.' }, 'es')).toMatch(/^El avatar se ha quedado sin voz/);
