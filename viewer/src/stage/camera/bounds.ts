@@ -7,6 +7,7 @@ export interface Bounds {
   nearest: number; // m from the target
   farthest: number;
   spine: THREE.Line3; // some of it stays in the picture
+  eyes: THREE.Vector3 | null; // the face around them does, clear of the controls
   solids: THREE.Plane[][]; // convex, their planes look outward: no camera inside
   head: THREE.Sphere | null; // none here either
 }
@@ -17,6 +18,9 @@ const HEAD_BEHIND = 0.08; // m from the eyes back to the middle of a head
 const UNDER_FACE = 0.13; // m from the eyes down to where the body begins
 const CLEAR = 0.1; // m around a body
 const ASIDE = 0.25; // m from the spine that may be looked at from nearby: arms
+const FACE = { aside: 0.08, above: 0.04, below: 0.12 }; // m from the eyes
+const NEAR = { aside: 0.5, above: 0.4, below: 0.6 }; // of half of the picture, at most: from nearby the eyes alone
+const SPINE = 0.9; // of half of the picture, aside of which the spine may be
 const HALVINGS = 16;
 const FARTHER = 1.8; // than where the visitor starts
 
@@ -33,6 +37,7 @@ export function boundsOf(sitter: Sitter, start: StartCamera, overview: StartCame
     nearest,
     farthest: FARTHER * Math.max(distance(start), distance(overview)),
     spine: new THREE.Line3(eyes.clone().addScaledVector(up, -lowest), eyes.clone()),
+    eyes,
     solids: [[...sides(box, CLEAR), neck]],
     head: new THREE.Sphere(eyes.clone().addScaledVector(toward, -HEAD_BEHIND), nearest + HEAD_BEHIND - 1e-3),
   };
@@ -44,26 +49,50 @@ export function boundsOfBody(box: THREE.Box3, camera: StartCamera): Bounds {
   const middle = box.getCenter(new THREE.Vector3());
   const reach = Math.max(...corners(box).map((corner) => corner.sub(middle).dot(up)));
   const spine = new THREE.Line3(middle.clone().addScaledVector(up, -reach), middle.clone().addScaledVector(up, reach));
-  return { nearest: LEAST, farthest: FARTHER * distance(camera), spine, solids: [sides(box, CLEAR)], head: null };
+  return { nearest: LEAST, farthest: FARTHER * distance(camera), spine, eyes: null, solids: [sides(box, CLEAR)], head: null };
+}
+
+/** What of a camera decides on what it sees. */
+export interface Lens {
+  slope: number; // half of the picture's height at 1 m
+  aspect: number; // width / height
+  free: number; // share of the height, from above, that nothing lies on
+  up: THREE.Vector3; // of the world
 }
 
 /**
- * Moves a camera and what it looks at back to where it may be: beside the person by as much as the
- * picture is wide at most, then backwards until it is outside. It looks the same way as before.
- *
- * @param slope half of the picture's lesser side at 1 m
+ * Moves a camera and what it looks at back to where it may be: aside until somebody's face is in the
+ * picture, or some of a body that has none, then backwards until it is outside. It looks the same
+ * way as before.
  */
-export function confine(eye: THREE.Vector3, target: THREE.Vector3, bounds: Bounds, slope: number): void {
+export function confine(eye: THREE.Vector3, target: THREE.Vector3, bounds: Bounds, lens: Lens): void {
   const back = eye.clone().sub(target);
   const nearest = bounds.spine.closestPointToPoint(target, true, new THREE.Vector3());
   const aside = target.clone().sub(nearest);
-  const shift = Math.min(0, ASIDE + (slope * back.length()) / 2 - aside.length());
+  const half = lens.slope * Math.min(1, lens.aspect) * back.length();
+  const shift = Math.min(0, Math.min(ASIDE + half / 2, SPINE * half) - aside.length());
   target.addScaledVector(aside.normalize(), shift);
   eye.copy(target).add(back);
   back.normalize();
+  const way = bounds.eyes ? towardFace(eye, back, bounds.eyes, lens) : new THREE.Vector3();
+  for (const point of [eye, target]) point.add(way);
   for (const solid of bounds.solids) eye.addScaledVector(back, wayOut(eye, back, solid));
   if (bounds.head) eye.addScaledVector(back, wayOutOfSphere(eye, back, bounds.head));
   for (const solid of bounds.solids) eye.addScaledVector(back, wayOut(eye, back, solid));
+}
+
+/** The way, across the line of sight, after which a camera sees the whole face, or as much of it as the picture holds. */
+function towardFace(eye: THREE.Vector3, back: THREE.Vector3, eyes: THREE.Vector3, { slope, aspect, free, up }: Lens): THREE.Vector3 {
+  const right = up.clone().cross(back).normalize();
+  const upward = back.clone().cross(right);
+  const way = eyes.clone().sub(eye);
+  const half = slope * Math.max(0, -way.dot(back));
+  const room = (side: keyof typeof FACE, length: number) => Math.min(FACE[side], NEAR[side] * length);
+  const wide = half * aspect - room('aside', half * aspect);
+  const [low, high] = [half * (1 - 2 * free) + room('below', half), half - room('above', half)];
+  const [x, y] = [way.dot(right), way.dot(upward)];
+  const [shownX, shownY] = [THREE.MathUtils.clamp(x, -wide, wide), THREE.MathUtils.clamp(y, Math.min(low, high), high)];
+  return right.multiplyScalar(x - shownX).addScaledVector(upward, y - shownY);
 }
 
 /**

@@ -1,7 +1,7 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import type { StartCamera } from '../../bundle/manifest.ts';
-import { confine, freeScale, type Bounds } from './bounds.ts';
+import { confine, freeScale, type Bounds, type Lens } from './bounds.ts';
 import { Flight, directionOf } from './flight.ts';
 import type { Framing, Picture, View } from './framing.ts';
 import { listenToZooming, placeOn, type Place } from './zooming.ts';
@@ -23,6 +23,7 @@ const FOCUS = 0.5; // of the distance that is left after a double click
 const ROOM = 1.25; // times the least distance: nearer, a double click goes back
 const ROUNDING = 1e-9; // m, and parts of a quaternion: no movement
 const BESIDE = 0.45; // m from the spine: what is farther is nobody
+const HEAD = 0.2; // m around the eyes, where no arms are
 
 /** A flight that has begun. */
 interface Journey {
@@ -198,7 +199,7 @@ export class Orbit {
     if (!point || distance < ROOM * bounds.nearest) return this.show(this.subject.home);
     const back = camera.position.clone().sub(controls.target).setLength(Math.max(bounds.nearest, FOCUS * distance));
     const eye = point.clone().add(back);
-    confine(eye, point, bounds, this.slope());
+    confine(eye, point, bounds, this.lens());
     this.setMoved(true);
     const up = camera.up.toArray();
     this.fly({ eye: eye.toArray(), target: point.toArray(), up, fov_y: camera.fov }, () => this.limit(this.start()));
@@ -209,7 +210,10 @@ export class Orbit {
     const { position } = this.camera;
     const ray = new THREE.Ray(position, this.under(at).sub(position).normalize());
     const point = new THREE.Vector3();
-    return ray.distanceSqToSegment(spine.start, spine.end, point) < BESIDE ** 2 ? point : null;
+    const nearest = new THREE.Vector3();
+    const apart = Math.sqrt(ray.distanceSqToSegment(spine.start, spine.end, point, nearest));
+    const isBesideHead = this.bounds?.eyes && nearest.distanceTo(spine.end) < HEAD;
+    return apart < (isBesideHead ? HEAD : BESIDE) ? point : null;
   }
 
   private setMoved(moved: boolean): void {
@@ -266,14 +270,13 @@ export class Orbit {
     const { camera, controls, bounds } = this;
     if (!bounds) return;
     if (!this.moved) this.setMoved(true);
-    confine(camera.position, controls.target, bounds, this.slope());
+    confine(camera.position, controls.target, bounds, this.lens());
     camera.updateMatrixWorld();
   }
 
-  /** Half of the picture's lesser side at 1 m. */
-  private slope(): number {
-    const { fov, aspect } = this.camera;
-    return Math.tan(THREE.MathUtils.degToRad(fov) / 2) * Math.min(1, aspect);
+  private lens(): Lens {
+    const { fov, aspect, up } = this.camera;
+    return { slope: Math.tan(THREE.MathUtils.degToRad(fov) / 2), aspect, free: this.picture.free, up };
   }
 
   private key(event: KeyboardEvent): void {
