@@ -217,6 +217,17 @@ describe('flying to another view', () => {
   });
 });
 
+test('dragging goes all around somebody with a body', () => {
+  const visit = new Visit();
+  const seen = Array.from({ length: 8 }, () => {
+    visit.canvas.drag(HEIGHT / 8, 0);
+    visit.settle();
+    const { x, z } = visit.orbit.camera.position;
+    return Math.round(MathUtils.radToDeg(Math.atan2(x - SITTER.eyes.x, z - SITTER.eyes.z)));
+  });
+  expect(seen.map(Math.abs)).toEqual([45, 90, 135, 180, 135, 90, 45, 0]);
+});
+
 describe('zooming beside her', () => {
   test('with a double click on what is behind her head goes back; from afar the face stays above the controls', () => {
     const visit = new Visit(PERSON, 1440, 900);
