@@ -14,6 +14,7 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ico3d.chat.serving.crowd import Crowd, machine_of
+from ico3d.chat.serving.refusals import Refusals
 from ico3d.chat.serving.sites import Sites
 
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
@@ -58,6 +59,7 @@ class Guard:
         sites: Sites | None = None,
         names: Collection[str] = (),
         camera: bool = False,
+        refusals: Refusals | None = None,
     ):
         """Wraps `app`, which is bound to the address `host`.
 
@@ -67,6 +69,7 @@ class Guard:
             sites: Sites that may embed the avatar; by default none.
             names: Further host names of the server.
             camera: Whether its pages may ask for the camera.
+            refusals: Takes which sites were refused, where sites can be allowed.
         """
         self._headers = HEADERS | ({"Permissions-Policy": WITH_CAMERA} if camera else {})
         self._app = app
@@ -74,6 +77,7 @@ class Guard:
         self._sites = sites or Sites()
         self._names = frozenset(names)
         self._crowd = Crowd()
+        self._refusals = refusals
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handles or refuses one request or WebSocket handshake."""
@@ -83,7 +87,10 @@ class Guard:
         headers = Headers(scope=scope)
         origin, path = headers.get("origin"), scope["path"]
         site = origin if self._sites.permits(origin, path) else None
-        if not is_own(headers.get("host"), None if site else origin, self._host, self._names):
+        host = headers.get("host")
+        if not is_own(host, None if site else origin, self._host, self._names):
+            if self._refusals and origin and is_own(host, None, self._host, self._names):
+                self._refusals.tell(origin, path)
             await self._refuse(403, FOREIGN, scope, receive, send)
             return
 

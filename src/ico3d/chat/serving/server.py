@@ -28,6 +28,7 @@ from ico3d.chat.serving.network.handshakes import behind_tls
 from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
 from ico3d.chat.serving.network.websocket import BoundedWebSocket
 from ico3d.chat.serving.page_files import PageFiles
+from ico3d.chat.serving.refusals import Refusals
 from ico3d.chat.serving.running.ending import PatientServer
 from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.serving.sites import Sites, add_tokens
@@ -119,7 +120,7 @@ def make_app(
     app.add_api_websocket_route("/echo", echo)
     add_tokens(app, sites)
     add_page(app)
-    return Guard(app, host, sites, names)
+    return Guard(app, host, sites, names, refusals=Refusals())
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:

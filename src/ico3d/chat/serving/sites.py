@@ -62,7 +62,7 @@ class Sites:
 
     def permits(self, origin: str | None, path: str) -> bool:
         """Whether pages of another site may load a path."""
-        return origin in self._embedding.origins and _is_below(path, EMBEDDED)
+        return origin in self._embedding.origins and is_embedded(path)
 
     def admits(self, scope: Scope, origin: str | None) -> bool:
         """Whether a request has the token that it needs, if it needs one.
@@ -78,7 +78,7 @@ class Sites:
 
     def headers(self, origin: str | None, path: str) -> dict[str, str]:
         """Headers that let a site's pages use an answer; none for other sites."""
-        shared = {"Vary": "Origin"} if self._embedding.origins and _is_below(path, EMBEDDED) else {}
+        shared = {"Vary": "Origin"} if self._embedding.origins and is_embedded(path) else {}
         if not self.permits(origin, path):
             return shared
         return shared | {
@@ -176,6 +176,11 @@ def add_tokens(app: FastAPI, sites: Sites) -> None:
             return JSONResponse({"error": str(error)}, 400)
         headers = {"Cache-Control": "no-store"}
         return JSONResponse({"token": text, "expires": expires}, headers=headers)
+
+
+def is_embedded(path: str) -> bool:
+    """Whether a path is of what sites embed."""
+    return _is_below(path, EMBEDDED)
 
 
 def _is_below(path: str, places: tuple[str, ...]) -> bool:
