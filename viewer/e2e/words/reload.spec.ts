@@ -86,7 +86,9 @@ describe('after a reload', () => {
     await page.click('#drawer-button');
     await page.click('#drawer-clear');
     expect([await rows(), await dividers(), await kept()]).toEqual([[], [], []]);
-    expect([await page.textContent('#record'), await page.textContent('#drawer-told')]).toEqual(['Nothing here yet.', 'Cleared']);
+    expect([await page.textContent('#record'), await page.textContent('#drawer-told')]).toEqual(['Nothing here yet.', 'Cleared here; Stella still knows it']);
+    expect(await page.isHidden('#captions')).toBe(true);
+    expect(await page.getAttribute('#drawer-clear', 'title')).toMatch(/^Clears what this page shows .* Stella still knows this talk until it ends$/);
     await reload();
     expect([(await rows()).length, await dividers()]).toEqual([1, []]);
     expect(errors).toEqual([]);

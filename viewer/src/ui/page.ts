@@ -45,7 +45,7 @@ export function makePage(
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
   const memory = new Memory(root, words, talker.home);
-  const transcript = new Transcript(root, words, talker, signal);
+  const transcript = new Transcript(root, words, talker, () => captions.clear(), signal);
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
   const sheet = new ServiceSheet(root, words, (offer) => choose(offer));

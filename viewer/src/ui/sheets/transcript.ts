@@ -9,7 +9,7 @@ import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
 import { isForOthers } from '../keys.ts';
 
-const TOLD = 3000; // ms for which it says what a button has done
+const TOLD = 4000; // ms for which it says what a button has done
 const END = 40; // pixels from the lower end within which the record follows what is said
 
 /** Who talks. */
@@ -36,18 +36,23 @@ export class Transcript {
   private announced = 0; // entries that screen readers have heard
   private readonly kept: KeptTalk | null;
   private readonly keep: () => void;
+  private readonly cleared: () => void;
 
-  constructor(page: HTMLElement, words: PageWords, talker: Talker, signal: AbortSignal) {
+  /** @param cleared called when the visitor wants nothing of what was said to be seen */
+  constructor(page: HTMLElement, words: PageWords, talker: Talker, cleared: () => void, signal: AbortSignal) {
     this.page = page;
     this.words = words;
     this.talker = talker;
+    this.cleared = cleared;
     this.list = byId(page, 'record');
     this.kept = talker.kept === null ? null : new KeptTalk(talker.home, talker.kept);
     const events = { changed: (entry: Entry) => this.changed(entry), renewed: () => this.renewed() };
     this.record = new TalkRecord(events, this.kept?.read());
     this.keep = this.kept ? keepUp(this.kept, () => this.record.lasting, signal) : () => {};
     byId(page, 'drawer-kept').hidden = this.kept === null;
-    byId(page, 'drawer-clear').onclick = () => this.clear();
+    const clear = byId(page, 'drawer-clear');
+    words.write(clear, say('transcript.clear.title', { name: talker.name }), 'title');
+    clear.onclick = () => this.clear();
     byId(page, 'drawer-copy').onclick = () => void this.copy();
     byId(page, 'drawer-save').onclick = () => saveText(this.text(), this.fileName());
     words.onChange(() => this.draw(), signal);
@@ -103,7 +108,8 @@ export class Transcript {
   private clear(): void {
     this.record.clear();
     this.kept?.write([]);
-    this.tell(say('transcript.cleared'));
+    this.cleared();
+    this.tell(say('transcript.cleared', { name: this.talker.name }));
   }
 
   private renewed(): void {
