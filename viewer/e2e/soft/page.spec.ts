@@ -161,6 +161,8 @@ describe('a page that draws without WebGL', () => {
     const figures = await page.evaluate(() => window.ico3d!.stage.figures);
     expect(figures.pixels).toEqual([WIDTH, HEIGHT]);
     expect(figures.gaussians).toBeGreaterThan(300);
+    const { project, bin, blend } = await page.evaluate(() => (window.ico3d!.stage.painter as unknown as { steps: Record<string, number> }).steps);
+    expect(figures.draw).toBeGreaterThan(0.5 * (project! + bin! + blend!)); // what workers take, not what it takes to ask them
   });
 
   test('leaves the processor to whoever works out an answer', async () => {

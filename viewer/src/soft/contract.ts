@@ -12,6 +12,8 @@ export interface Painter {
   readonly sorting: boolean;
   readonly lastSortTime: number; // when the last sort began, ms of the performance clock
   readonly sortTook: number; // ms
+  /** How long it was until the last picture was there, ms, where others than this thread draw; null where painting takes that long. */
+  readonly drawTook: number | null;
   /** Whether a picture is being drawn, beside which no other one can be. */
   readonly busy: boolean;
   /** Whether what it draws with was taken away. */

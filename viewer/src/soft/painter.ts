@@ -18,7 +18,8 @@ class SoftPainter implements Painter {
   readonly path = 'soft';
   pixels: [number, number] = [0, 0];
   gaussians = 0;
-  sortTook = 0;
+  sortTook = 0; // into tiles, by the slowest worker
+  drawTook: number | null = null;
   lastSortTime = 0;
   /** What the steps of the last picture took, ms: those of the slowest band, and showing it on this thread. */
   steps: Steps & { show: number } = { project: 0, spread: 0, bin: 0, blend: 0, show: 0 };
@@ -164,8 +165,10 @@ class SoftPainter implements Painter {
     }
     this.gaussians = Math.max(...this.drawn.map(({ gaussians }) => gaussians));
     const slowest = this.drawn.reduce((slow, one) => (one.took > slow.took ? one : slow));
-    this.sortTook = slowest.took;
-    this.steps = { ...slowest.steps, show: performance.now() - before };
+    this.sortTook = slowest.steps.bin;
+    const now = performance.now();
+    this.drawTook = now - this.lastSortTime;
+    this.steps = { ...slowest.steps, show: now - before };
     this.bands.took(this.drawn.map(({ took }) => took));
     for (const resolve of this.waiting.splice(0)) resolve();
     this.pulse.done();

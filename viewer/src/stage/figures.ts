@@ -5,8 +5,8 @@ export interface Figures {
   drawn: Message; // what draws, and why it does
   frames: number; // drawn so far
   evaluation: number; // ms of a picture: who moves, and how
-  sort: number; // ms of the last sort, beside the pictures
-  draw: number; // ms of a picture until the GPU has all orders
+  sort: number; // ms of the last sort: beside the pictures by WebGL, a part of drawing by the processor
+  draw: number; // ms of a picture, until the GPU has all orders or the processor has drawn it
   gaussians: number; // drawn
   level: number; // of quality, 1 the best
   levels: number;

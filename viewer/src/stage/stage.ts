@@ -289,7 +289,7 @@ export class Stage {
     }
     const before = performance.now();
     this.painter.paint(this.scene, this.camera, this.presentation !== null);
-    this.drawing.add(performance.now() - before);
+    this.drawing.add(this.painter.drawTook ?? performance.now() - before);
     this.frames++;
   }
 

@@ -15,6 +15,9 @@ from ico3d.chat.settings.keys import OPENAI_KEY, key_for
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
 
+IN_FILE = " in a settings file (--settings FILE)"
+"""Where a table of settings stands that a sentence names."""
+
 
 @runtime_checkable
 class WarmsUp(Protocol):
@@ -73,7 +76,7 @@ def nothing(settings: Any) -> str:
 def lacks_server(url: str, key_variable: str, kind: str) -> str:
     """A sentence if no server is named or its key is missing, else empty."""
     if not url and not os.environ.get(key_variable or OPENAI_KEY):
-        return f'no server is chosen: set [{kind}] use = "openai" and url.'
+        return f'no server is chosen: set [{kind}] use = "openai" and url{IN_FILE}.'
     try:
         key_for(url, key_variable, f"[{kind}]")
     except SettingsError as error:

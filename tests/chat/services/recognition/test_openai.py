@@ -123,7 +123,10 @@ async def test_no_server_is_told_of():
 
 
 async def test_it_is_never_chosen_by_itself():
-    assert hindrance(Settings()) == 'no server is chosen: set [recognition] use = "openai" and url.'
+    assert hindrance(Settings()) == (
+        'no server is chosen: set [recognition] use = "openai" and url in a settings file '
+        "(--settings FILE)."
+    )
     with pytest.raises(SettingsError, match="url must be an address"):
         Settings("http://[")
     assert "no server answers at http://[" in hindrance(Settings("http://[::1]:9/v1"))

@@ -62,6 +62,8 @@ export class SparkPainter implements Painter {
     return this.current.lastSortTime;
   }
 
+  readonly drawTook = null;
+
   get sortTook(): number {
     return this.current.sortTook;
   }

@@ -9,7 +9,11 @@ import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
 
 /** What a name alone does not tell. */
-const ABOUT: Partial<Record<Key, Key>> = { 'figure.evaluate': 'figure.evaluate.about', 'figure.quality': 'figure.quality.about' };
+const ABOUT: Partial<Record<Key, Key>> = {
+  'figure.evaluate': 'figure.evaluate.about',
+  'figure.draw': 'figure.draw.about',
+  'figure.quality': 'figure.quality.about',
+};
 const PERIOD = 1000; // ms between updates
 
 /** The small panel with figures: frame rate, latency and its parts. */

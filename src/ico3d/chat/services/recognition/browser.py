@@ -27,7 +27,7 @@ from pipecat.utils.time import time_now_iso8601
 from ico3d.chat.frames import message_in
 from ico3d.chat.pipecat_internals import is_user_speaking, raise_event
 from ico3d.chat.services.choosing import ChosenService, chosen
-from ico3d.chat.services.provider import Context, Table
+from ico3d.chat.services.provider import IN_FILE, Context, Table
 from ico3d.chat.services.recognition.room import Room
 from ico3d.chat.services.recognition.segments import blank
 from ico3d.chat.settings.conversation import BEST, Choice
@@ -195,7 +195,7 @@ def hindrance(settings: Settings) -> str:
     """A sentence that keeps `best` from choosing the browser, which must be asked for by name."""
     return (
         "the browser's maker may receive the sound: "
-        'set [recognition] use = "browser" if that is wanted.'
+        f'set [recognition] use = "browser"{IN_FILE} if that is wanted.'
     )
 
 

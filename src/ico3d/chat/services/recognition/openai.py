@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.chat.services.provider import Context, lacks_server
+from ico3d.chat.services.provider import IN_FILE, Context, lacks_server
 from ico3d.chat.services.recognition.openai_settings import Settings
 
 KNOCK = 0.3  # s that a server may take to accept a connection
@@ -21,7 +21,7 @@ def hindrance(settings: Settings) -> str:
         port = address.port or (443 if address.scheme == "https" else 80)
         socket.create_connection((address.hostname or "", port), KNOCK).close()
     except (OSError, ValueError):
-        return f"no server answers at {settings.url}: start it, or set [recognition] url."
+        return f"no server answers at {settings.url}: start it, or set [recognition] url{IN_FILE}."
     return ""
 
 
