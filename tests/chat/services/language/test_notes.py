@@ -1,6 +1,7 @@
 """The persona's notes: other words and misheard ones find the answer, foreign ones do not."""
 
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -54,6 +55,23 @@ def test_the_best_note_answers(notes, question, answer):
 def test_what_no_note_knows_is_admitted_with_examples(notes, question):
     answer = notes.answer(question)
     assert answer.startswith("I do not know that.") and "what is your name" in answer
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        *("What is my name?", "My name is Tom and I like tea.", "Do you know my name?"),
+        *("who am I", "what am I made of", "What's my name again?", "who made me"),
+    ],
+)
+def test_what_is_said_of_the_visitor_is_not_answered_with_what_is_known_of_the_avatar(notes, said):
+    assert notes.answer(said).startswith("I do not know that.")
+    assert notes.answer(f"{said} And what is your name?") == "I am Ada."
+
+
+def test_a_note_that_asks_of_visitors_too_answers_them():
+    cameras = Notes(replace(PERSONA, notes=("what do I need | what do you need => A camera.",)))
+    assert cameras.answer("Do I need much?") == "A camera."
 
 
 def test_pleasantries(notes):

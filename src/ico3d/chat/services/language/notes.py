@@ -1,5 +1,6 @@
 """Finds the note that answers a question; tolerates other wordings and misheard words."""
 
+import itertools
 import math
 import re
 import unicodedata
@@ -36,6 +37,9 @@ COMMON = frozenset(
 COMMON_WEIGHT = 0.25  # of words that every question has, against the others
 UNKNOWN_WEIGHT = 0.5  # of words that no note has, against the rarest that one has
 SHORTEST_ROOT = 4  # letters of a word's stem by which its other forms are known
+OWN = frozenset(["i", "me", "my", "mine"])
+ADDRESSED = {"i": "you", "me": "you", "my": "your", "mine": "yours", "am": "are", "was": "were"}
+"""What a visitor says of themselves, as notes ask it of the avatar."""
 HELLO = frozenset(["hello", "hi", "hey", "greetings", "howdy"])
 THANKS = frozenset(["thank", "thanks", "thx", "cheers"])
 GOODBYE = frozenset(["bye", "goodbye", "farewell"])
@@ -81,7 +85,7 @@ class Notes:
         if any(concerns(question, topic) for topic in self._persona.forbidden):
             return self.refusal()
         best, score = self.best(question)
-        if best is not None and score >= CONFIDENT:
+        if best is not None and score >= CONFIDENT and not is_of_visitor(question, best):
             return best.answer
         if requested(question, self._gestures) in self._gestures:
             return "Of course."  # the body shows the rest
@@ -179,6 +183,30 @@ def plain(text: str) -> str:
 def words(text: str) -> list[str]:
     """The stems of a text's words."""
     return [stem(word) for word in plain(text).split()]
+
+
+def pairs(found: list[str]) -> set[tuple[str, str]]:
+    """The pairs of words that follow one another."""
+    return set(itertools.pairwise(found))
+
+
+def is_of_visitor(question: str, note: Note) -> bool:
+    """Whether visitors say of themselves what a note asks of the avatar.
+
+    A note that asks for "your name" has no answer to "what is my name", and none to "my name is
+    Tom", however alike they are. Who also asks for the avatar's is answered, and so is who asks
+    what a note asks of visitors, too, such as "do I need".
+    """
+    said = words(question)
+    last = len(said) - 1
+    own = {
+        (said[at - 1], word) if at == last else (word, said[at + 1])
+        for at, word in enumerate(said)
+        if word in OWN and last > 0
+    }
+    turned = {(ADDRESSED.get(a, a), ADDRESSED.get(b, b)) for a, b in own} - pairs(said)
+    asked = {pair for question in note.questions for pair in pairs(words(question))}
+    return bool(turned & asked) and not own & asked
 
 
 def stem(word: str) -> str:
