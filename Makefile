@@ -9,10 +9,10 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: demo demo-natural test quick quick-unit install viewer lint strict page unit e2e e2e-beside e2e-alone bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
-	$(VENV)/bin/ico3d demo
+	$(VENV)/bin/ico3d demo $(if $(PORT),--port $(PORT))
 
 demo-natural: $(VENV)/.serve src/ico3d/chat/static/index.html ## the same with Whisper, a small language model and a natural voice
-	$(VENV)/bin/ico3d demo --natural
+	$(VENV)/bin/ico3d demo --natural $(if $(PORT),--port $(PORT))
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side

@@ -160,7 +160,7 @@ def bind(host: str, port: int) -> socket.socket:
         listener.close()
         raise SettingsError(
             f"port {port} on {host} cannot be used ({error.strerror}): "
-            "choose another one with --port, 0 takes any."
+            "choose another one with --port (make demo: PORT=...), 0 takes any."
         ) from error
     return listener
 
