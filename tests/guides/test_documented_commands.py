@@ -93,7 +93,7 @@ def taken(words: list[str]) -> bool:
     if program == "ico3d":
         return taken_by_verb(rest)
     if program == "make":
-        return set(rest) <= set(TARGETS)
+        return all(word in TARGETS or is_variable(word) for word in rest)
     if program == "npm":
         return rest[0] in ("ci", "pack", "test") or rest[-1] in PACKAGE["scripts"]
     if program == "npx":
@@ -103,6 +103,12 @@ def taken(words: list[str]) -> bool:
     if program == "python" and rest[0] == "-m" and rest[1].startswith("ico3d."):
         return importlib.util.find_spec(rest[1]) is not None
     return True
+
+
+def is_variable(word: str) -> bool:
+    """Whether a word gives a value to a variable of the Makefile."""
+    name, equals, _ = word.partition("=")
+    return bool(equals) and f"$({name})" in (ROOT / "Makefile").read_text("utf-8")
 
 
 def taken_by_verb(words: list[str]) -> bool:
