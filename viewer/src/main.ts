@@ -2,6 +2,7 @@ import type { Generator } from './gaussians/generator.ts';
 import './style.css';
 import { Server } from './server.ts';
 import { readSplats, type Splats } from './stage/webgl/readback.ts';
+import { KeptTalk } from './ui/sheets/kept-talk.ts';
 import { showWayBack } from './ui/way-back.ts';
 import { Visit, type Presence } from './visit.ts';
 import { PageWords } from './words/page-words.ts';
@@ -31,7 +32,7 @@ const visit: Visit = new Visit(document.body, new Server(new URL(location.href))
     if (seconds !== null) void import('./bench.ts').then(({ bench }) => bench(presence, Number(seconds) || undefined));
   },
   reload: () => location.reload(),
-  keeps: true,
+  keeps: (home, avatar) => new KeptTalk(home, avatar), // a reload does not lose it
   key: secrets.get('key'),
   unlock: (key) => {
     secrets.set('key', key);

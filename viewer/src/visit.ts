@@ -22,6 +22,7 @@ import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { offerDrawing } from './ui/sheets/drawing.ts';
+import type { TalkStore } from './ui/sheets/kept-talk.ts';
 import { showOrigin } from './ui/sheets/origin.ts';
 import { makeThemeButton, showTheme } from './ui/theme.ts';
 import type { PageWords } from './words/page-words.ts';
@@ -70,8 +71,8 @@ export interface VisitPorts {
   key?: string | null;
   /** Tries a key that the visitor types; only where he may have one. */
   unlock?(key: string): void;
-  /** The tab keeps what was said, so that a reload does not lose it; the storage of a page around it is not ours. */
-  keeps?: boolean;
+  /** Gives where what was said stays once a talk is over, by the server's address and what tells avatars apart. */
+  keeps(home: string, avatar: string): TalkStore;
 }
 
 /**
@@ -131,8 +132,8 @@ export class Visit {
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, (all, controls) => stage.keepClear(all, controls));
-    const kept = this.ports.keeps ? identityOf(manifest) : null;
-    const talker = { name, languages: manifest.persona.languages ?? [], home: server.home(), kept };
+    const home = server.home();
+    const talker = { name, languages: manifest.persona.languages ?? [], home, kept: this.ports.keeps(home, identityOf(manifest)) };
     const page = makePage(root, words, talker, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };

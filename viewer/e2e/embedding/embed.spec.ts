@@ -219,6 +219,12 @@ test('the floating one is worked with the keyboard alone', async () => {
   await page.waitForFunction(() => window.sockets.every(({ readyState }) => readyState === WebSocket.CLOSED));
   expect(await inside()).toBe('launcher');
   expect(await page.evaluate(() => document.querySelector('ico3d-avatar')!.hasAttribute('open'))).toBe(false);
+
+  await page.keyboard.press('Enter'); // what was said is still there, and nowhere in the site's storage
+  await page.waitForFunction(() => window.told.filter(({ type }) => type === 'ready').length === 2, undefined, { timeout: READY_WITHIN });
+  const said = await page.evaluate(() => document.querySelector('ico3d-avatar')!.shadowRoot!.getElementById('record')!.textContent);
+  expect(said).toMatch(/^Earlier: Stella no longer knows this.*Who are you\?.*I am Stella\..*A new conversation/);
+  expect(await page.evaluate(() => Object.keys(sessionStorage))).toEqual([]);
   await browser.close();
 });
 

@@ -7,6 +7,7 @@ import { focusOn } from '../ui/elements.ts';
 import { icon } from '../ui/icons.ts';
 import { codeOf, english, say, type Sentence } from '../words/text.ts';
 import { Overlay, type Choice } from '../ui/overlay.ts';
+import { TalkMemory } from '../ui/sheets/kept-talk.ts';
 import { followTheme, showTheme } from '../ui/theme.ts';
 import type { Presence, Visit } from '../visit.ts';
 import { xrSettings } from '../xr/settings.ts';
@@ -43,6 +44,7 @@ export class AvatarElement extends HTMLElement {
   private talk: Talk | null = null;
   private invitation: AbortController | null = null;
   private volume = 1;
+  private readonly said = new TalkMemory(); // until the element is gone
 
   constructor() {
     super();
@@ -237,6 +239,7 @@ export class AvatarElement extends HTMLElement {
         failed(new PageError(sentence));
       },
       reload: () => this.restart(),
+      keeps: (home: string, avatar: string) => this.said.of(home, avatar), // the storage of the page around is not ours
     };
   }
 

@@ -9,8 +9,34 @@ const SOON = 500; // ms after a change: while she speaks, each word is one
 /** A line as it is kept: who, when in ms since 1970, text, whether it was interrupted. */
 type Line = readonly [Entry['who'], number, string, boolean];
 
+/** Where the lines of a talk stay once it is over. */
+export interface TalkStore {
+  /** Whether they are there after a reload of the page. */
+  readonly outlastsPage: boolean;
+  /** What was said, the oldest first. */
+  read(): Entry[];
+  /** Keeps what was said instead of what was kept before. */
+  write(entries: readonly Entry[]): void;
+}
+
+/** What was said with each avatar, for as long as this object lives: nothing of it goes into the browser's storage. */
+export class TalkMemory {
+  private readonly said = new Map<string, readonly Entry[]>();
+
+  /** The lines of one avatar, named as in `KeptTalk`. */
+  of(home: string, avatar: string): TalkStore {
+    const key = JSON.stringify([home, avatar]);
+    return {
+      outlastsPage: false,
+      read: () => [...(this.said.get(key) ?? [])],
+      write: (entries) => this.said.set(key, entries.slice(-MOST_LINES)),
+    };
+  }
+}
+
 /** What was said with an avatar: in this tab alone until it is closed, so that a reload of the page does not lose it. */
-export class KeptTalk {
+export class KeptTalk implements TalkStore {
+  readonly outlastsPage = true;
   private readonly key: string;
   private readonly avatar: string;
 
@@ -50,7 +76,7 @@ export class KeptTalk {
  *
  * @returns is to be called after each change
  */
-export function keepUp(kept: KeptTalk, said: () => readonly Entry[], signal: AbortSignal): () => void {
+export function keepUp(kept: TalkStore, said: () => readonly Entry[], signal: AbortSignal): () => void {
   let due: ReturnType<typeof setTimeout> | undefined;
   const write = () => {
     if (due === undefined) return;

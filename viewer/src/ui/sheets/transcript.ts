@@ -4,7 +4,7 @@ import type { PageWords } from '../../words/page-words.ts';
 import { say, type Sentence } from '../../words/text.ts';
 import { copyText, saveText } from './clipboard.ts';
 import { Disclosure } from './disclosure.ts';
-import { KeptTalk, keepUp } from './kept-talk.ts';
+import { keepUp, type TalkStore } from './kept-talk.ts';
 import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
 import { isForOthers } from '../keys.ts';
@@ -19,11 +19,11 @@ export interface Talker {
   languages: readonly string[];
   /** Address of its server. */
   home: string;
-  /** What tells it from other avatars in the lines that the tab keeps; null where no line is kept. */
-  kept: string | null;
+  /** Where its lines stay once a talk is over. */
+  kept: TalkStore;
 }
 
-/** The drawer with all that was said, and what screen readers hear of it; where the tab keeps it, also before a reload. */
+/** The drawer with all that was said, and what screen readers hear of it; where it is kept, also of talks before. */
 export class Transcript {
   readonly record: TalkRecord;
   private readonly page: HTMLElement;
@@ -34,7 +34,6 @@ export class Transcript {
   private began = new Date(); // the talk
   private recalls = false; // the avatar was told what the visitor said in earlier ones
   private announced = 0; // entries that screen readers have heard
-  private readonly kept: KeptTalk | null;
   private readonly keep: () => void;
   private readonly cleared: () => void;
 
@@ -45,11 +44,10 @@ export class Transcript {
     this.talker = talker;
     this.cleared = cleared;
     this.list = byId(page, 'record');
-    this.kept = talker.kept === null ? null : new KeptTalk(talker.home, talker.kept);
     const events = { changed: (entry: Entry) => this.changed(entry), renewed: () => this.renewed() };
-    this.record = new TalkRecord(events, this.kept?.read());
-    this.keep = this.kept ? keepUp(this.kept, () => this.record.lasting, signal) : () => {};
-    byId(page, 'drawer-kept').hidden = this.kept === null;
+    this.record = new TalkRecord(events, talker.kept.read());
+    this.keep = keepUp(talker.kept, () => this.record.lasting, signal);
+    byId(page, 'drawer-kept').hidden = !talker.kept.outlastsPage;
     const clear = byId(page, 'drawer-clear');
     words.write(clear, say('transcript.clear.title', { name: talker.name }), 'title');
     clear.onclick = () => this.clear();
@@ -76,7 +74,7 @@ export class Transcript {
   /** The server has ended the talk: its lines stay until the next one begins, which may be somebody else's. */
   close(): void {
     this.record.close();
-    this.kept?.write([]);
+    this.talker.kept.write([]);
   }
 
   /** Says of earlier talks whether the avatar was told what the visitor said in them. */
@@ -107,7 +105,7 @@ export class Transcript {
 
   private clear(): void {
     this.record.clear();
-    this.kept?.write([]);
+    this.talker.kept.write([]);
     this.cleared();
     this.tell(say('transcript.cleared', { name: this.talker.name }));
   }
