@@ -19,7 +19,7 @@ describe('a typed question', () => {
     await until(browser, finished(0), 30_000); // the greeting
     expect(await page.locator('#answer').textContent()).toBe('Hello.');
     expect(await page.locator('#stand-ins').textContent()).toBe(
-      'Small offline services listen, answer, and speak; how to get better ones is in the settings',
+      'Small offline services listen, answer, and speak; the settings tell of better ones',
     );
 
     await page.evaluate(() => {
