@@ -80,26 +80,44 @@ def unpack_rows(rows):
     return np.uint64(rows) // np.uint64(ROWS), np.uint64(rows) % np.uint64(ROWS)
 
 
+@subroutine(fast=False)
+def _whole(number, least, most):
+    """A number rounded down and held between two whole ones; the lower one for what is no number.
+
+    Held before it is rounded: no integer holds what may come in.
+    """
+    if not number > least:
+        return least
+    return floor(number) if number < most else most
+
+
 @subroutine()
 def _span(low, high, tile, count):
-    """First and end of the `count` tiles that the pixel range [low, high] touches."""
-    return max(0, floor(low / tile)), min(count, floor(high / tile) + 1)
+    """First and end of the `count` tiles that the pixel range [low, high] touches; first ≤ end."""
+    first = _whole(low / tile, 0, count)
+    return first, _whole(high / tile, first - 1, count - 1) + 1
 
 
 @subroutine()
 def _columns(splat, across):
-    """First and end column of tiles that a splat touches."""
+    """First and end column of tiles of a splat's box."""
     reach = splat[6] + SLACK
     return _span(splat[0] - reach, splat[0] + reach, TILE_WIDTH, across)
+
+
+@subroutine()
+def _rows(splat, down):
+    """First and end row of tiles of a splat's box."""
+    reach = splat[7] + SLACK
+    return _span(splat[1] - reach, splat[1] + reach, TILE_HEIGHT, down)
 
 
 @subroutine()
 def _most_pairs(splat, across, down):
     """How many pairs a splat has at most: the tiles of its box."""
     left, right = _columns(splat, across)
-    reach = splat[7] + SLACK
-    top, bottom = _span(splat[1] - reach, splat[1] + reach, TILE_HEIGHT, down)
-    return max(0, right - left) * max(0, bottom - top)
+    top, bottom = _rows(splat, down)
+    return (right - left) * (bottom - top)
 
 
 @kernel()
@@ -163,6 +181,10 @@ def _reach(tip, discriminant, room, b, low, high):
 def _list(splat, number, across, down, pair, counts, pairs):
     """Lists the tiles of a splat and the rows it touches there, from pair `pair` on.
 
+    What lies outside of the box is left out, so that the pairs fit into the room for them: the
+    ellipse of a splat far off the picture is larger, where the projection limited the box, or where
+    rounding errors count.
+
     Returns:
         The number behind the last pair.
     """
@@ -170,12 +192,14 @@ def _list(splat, number, across, down, pair, counts, pairs):
     tip, scale = -0.5 * b / p * splat[7], 0.5 / q
     discriminant, room = b * b - 4 * p * q, 4 * q * splat[5]
     left, right = _columns(splat, across)
+    upper, lower = _rows(splat, down)
+    highest, lowest = upper * TILE_HEIGHT, lower * TILE_HEIGHT
     for column in range(left, right):
         low = column * TILE_WIDTH - x - SLACK
         high = low + TILE_WIDTH - 1 + 2 * SLACK
         top, bottom = _reach(tip, discriminant, room, b, low, high)
-        first = max(0, floor(y + scale * top - SLACK) + 1)
-        end = min(down * TILE_HEIGHT, floor(y + scale * bottom + SLACK) + 1)
+        first = _whole(y + scale * top - SLACK, highest - 1, lowest) + 1
+        end = _whole(y + scale * bottom + SLACK, highest - 1, lowest - 1) + 1
         if first < end:
             for row in range(first // TILE_HEIGHT, (end - 1) // TILE_HEIGHT + 1):
                 above = row * TILE_HEIGHT
