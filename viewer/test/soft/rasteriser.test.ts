@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 import { makeKernel } from '../../src/soft/kernel.ts';
 import { Rasteriser, type Frame } from '../../src/soft/rasteriser.ts';
-import { TILE_WIDTH } from '../../src/soft/tiles.ts';
+import { TILE_HEIGHT, TILE_WIDTH } from '../../src/soft/tiles.ts';
 import { psnr, worst } from '../../support/browser/pictures.ts';
 import { clothOf } from '../../support/browser/view.ts';
 import { makeGaussians } from '../../support/references/gaussians/reference.ts';
@@ -69,6 +69,28 @@ describe('the rasteriser', () => {
     }
     expect(worst(pictures[1]!, pictures[0]!)).toBeLessThanOrEqual(1);
     expect(bytes[1]).toBe(bytes[0]);
+  });
+
+  test('lists no Gaussian more often than there are tiles, whatever its numbers are', async () => {
+    const [kernel, rows] = [await makeKernel(), Math.ceil(HEIGHT / TILE_HEIGHT)];
+    const [view, at] = [kernel.reserve(48), kernel.reserve(64)];
+    new Float32Array(kernel.memory.buffer, view, 12).set([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]);
+    kernel.layOut(1, COLUMNS * rows, COLUMNS * rows);
+    const places = [0, 1, 1e4, -1e4, 1e7, -1e7, 1e30, Infinity, NaN];
+    const sizes = [1e-3, 1, 1e3, 1e6, 1e9, 1e30, Infinity, NaN];
+    let seen = 0;
+    for (const x of places)
+      for (const y of places)
+        for (const wide of sizes)
+          for (const high of sizes) {
+            new Float32Array(kernel.memory.buffer, at, 16).set([x, y, 1, 1, 0, 0, 0.3, wide, high, 1, 0.5, 0.4, 0.3, 0.9, 0, 0]);
+            kernel.begin(100, 100, 100, 75, WIDTH, HEIGHT, 0, COLUMNS);
+            kernel.fade(1, 1);
+            kernel.addStill(view, at, 1);
+            seen += kernel.seen();
+            expect(kernel.bin(), `${x}, ${y}, ${wide}, ${high}`).toBe(1);
+          }
+    expect(seen).toBeGreaterThan(100);
   });
 
   test('keeps the pixels of tiles that did not change, and no others', async () => {

@@ -65,10 +65,18 @@ function pass(from: usize, to: usize, shift: u32): void {
   }
 }
 
+/** A number rounded down and held between two whole ones, before it is: no integer holds what may come in; `least` for what is no number. */
+// @ts-ignore: decorator
+@inline
+function whole(number: f32, least: i32, most: i32): i32 {
+  return number > <f32>least ? (number < <f32>most ? <i32>floor<f32>(number) : most) : least;
+}
+
 /**
  * Lists the pairs of tile and entry of all splats, and counts those of each tile.
  *
- * Tiles are numbered down the columns of the band.
+ * Tiles are numbered down the columns of the band. No splat is listed outside of its box, by which
+ * there is room for it: the ellipse of one far off the picture may be larger, as it is rounded.
  *
  * @param order the splats front to back, 8 bytes each: depth, number
  * @param pairs gets 8 bytes each: tile, entry
@@ -78,7 +86,6 @@ function pass(from: usize, to: usize, shift: u32): void {
  */
 export function listPairs(order: usize, pairs: usize, most: u32, counts: usize, firstColumn: i32, endColumn: i32, down: i32): u32 {
   memory.fill(counts, 0, 4 * <usize>((endColumn - firstColumn) * down));
-  const lowest = down * TILE_HEIGHT;
   let number: u32 = 0;
   for (let i: usize = 0; i < <usize>count; i++) {
     const splat = load<u32>(order + (i << 3), 4);
@@ -96,10 +103,14 @@ export function listPairs(order: usize, pairs: usize, most: u32, counts: usize, 
     const discriminant: f32 = -TWO * TWO * a * a * load<f32>(record, 16);
     const room: f32 = TWO * TWO * q * cut;
     const scale: f32 = 0.5 / q;
-    const from = max(firstColumn, <i32>floor<f32>((x + HALF - reachX) * (ONE / <f32>TILE_WIDTH)));
-    const to = min(endColumn, <i32>floor<f32>((x + HALF + reachX) * (ONE / <f32>TILE_WIDTH)) + 1);
-    const rows = 2 + <i32>min(load<f32>(record, 44) * (TWO / <f32>TILE_HEIGHT), <f32>down);
-    if (number + <u32>(max(0, to - from) * (rows + 1)) > most) return most + 1;
+    const reachY = load<f32>(record, 44) + SLACK;
+    const from = whole((x + HALF - reachX) * (ONE / <f32>TILE_WIDTH), firstColumn, endColumn);
+    const to = whole((x + HALF + reachX) * (ONE / <f32>TILE_WIDTH), from - 1, endColumn - 1) + 1;
+    const upper = whole((y + HALF - reachY) * (ONE / <f32>TILE_HEIGHT), 0, down);
+    const lower = whole((y + HALF + reachY) * (ONE / <f32>TILE_HEIGHT), upper - 1, down - 1) + 1;
+    if (number + <u32>((to - from) * (lower - upper)) > most) return most + 1;
+    const highest = upper * TILE_HEIGHT;
+    const lowest = lower * TILE_HEIGHT;
     for (let column = from; column < to; column++) {
       const low = <f32>(column * TILE_WIDTH) - x - SLACK;
       const high = low + <f32>(TILE_WIDTH - 1) + TWO * SLACK;
@@ -110,8 +121,8 @@ export function listPairs(order: usize, pairs: usize, most: u32, counts: usize, 
       if (underTop < 0 || underBottom < 0) continue;
       const least = shear * bottom - sqrt<f32>(underBottom);
       const greatest = shear * top + sqrt<f32>(underTop);
-      const first = max(0, <i32>floor<f32>(y + scale * least - SLACK) + 1);
-      const end = min(lowest, <i32>floor<f32>(y + scale * greatest + SLACK) + 1);
+      const first = whole(y + scale * least - SLACK, highest - 1, lowest) + 1;
+      const end = whole(y + scale * greatest + SLACK, highest - 1, lowest - 1) + 1;
       for (let above = first & ~(TILE_HEIGHT - 1); above < end; above += TILE_HEIGHT) {
         const tile = <usize>((column - firstColumn) * down + above / TILE_HEIGHT);
         const counter = counts + (tile << 2);
