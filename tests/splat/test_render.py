@@ -187,12 +187,13 @@ def test_broken_numbers_do_no_harm_to_memory(cameras, name, value):
     picture.rgb.sum().backward()
     tiles = bin_views(*broken_projection(ours, cameras), 44, 30)
     for view in tiles:
-        owned = [range(*ends) for ends in zip(view.first_pair, view.end_pair, strict=True)]
-        splats, rows, pairs = view.entries.T
+        (band,) = view.bands()
+        owned = [range(*ends) for ends in zip(band.first_pair, band.end_pair, strict=True)]
+        splats, rows, pairs = band.entries.T
         found = sorted(zip(pairs, splats, strict=True))
         listed = zip(owned, view.order, strict=True)
         assert found == [(pair, splat) for own, splat in listed for pair in own]
-        assert view.first_entry[-1] == len(pairs) <= view.room
+        assert band.first_entry[-1] == len(pairs) <= band.room
         spans = [unpack_rows(packed) for packed in rows]
         assert all(0 <= first < end <= TILE_HEIGHT for first, end in spans)
 

@@ -244,7 +244,7 @@ def compare(path: Path, count: int, size: int, runs: int) -> Comparison:
     return Comparison(
         count,
         size,
-        len(ours.tiles.entries),
+        sum(len(band.entries) for band in ours.tiles.bands()),
         *map(float, np.median(times, 0)),
         image_difference=float(np.abs(ours.image - theirs.image).max()),
         gradient_difference=float(difference.max()),

@@ -27,7 +27,7 @@ from ico3d.splat.cpu.forward import (
     power_of_two,
     window,
 )
-from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Tiles, tiles_across, unpack_rows
+from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Band, Tiles, unpack_rows
 
 GRADIENTS = 9
 """Gradients per splat: mean (2), conic (3), opacity, colour (3)."""
@@ -129,24 +129,24 @@ def _collect(state, records, entries, center, splats, parts):
 
 @kernel(parallel=True)
 def _collect_all(
-    hands, across, records, first_entry, entries, image, light, g_image, g_light, parts
+    hands, left, across, records, first_entry, entries, image, light, g_image, g_light, parts
 ):
-    """Writes the gradients of all pairs; each thread takes every `hands`-th block."""
+    """Writes the gradients of all pairs of a band; each thread takes every `hands`-th block."""
     for hand in numba.prange(hands):
         state, splats = np.empty(7 * PLANE, np.float32), np.empty((CHECK, 9), np.float32)
         _pixel_positions(state, 5)
         for block in range(hand, first_entry.size // BLOCK, hands):
             _read(
                 state,
-                window(image, block, across),
-                window(light, block, across),
-                window(g_image, block, across),
-                window(g_light, block, across),
+                window(image, block, left, across),
+                window(light, block, left, across),
+                window(g_image, block, left, across),
+                window(g_light, block, left, across),
             )
             for i in range(BLOCK):
                 tile = block * BLOCK + i
                 some = entries[first_entry[tile] : first_entry[tile + 1]]
-                center = first_center(tile, across)
+                center = first_center(tile, left, across)
                 _collect(state[i * PIXELS :], records, some, center, splats, parts)
 
 
@@ -193,12 +193,33 @@ def draw_backward(
         (N, 9) float32: mean (2), conic (3), opacity, colour (3); with `absolute` (N, 11).
     """
     columns = GRADIENTS + (ABSOLUTE if absolute else 0)
-    parts = np.empty((tiles.room, columns), np.float32)
-    gradients = np.empty((len(records), columns), np.float32)
-    across, hands = tiles_across(tiles.width), numba.get_num_threads()
-    first_entry, entries = tiles.first_entry, tiles.entries
-    _collect_all(
-        hands, across, records, first_entry, entries, image, light, g_image, g_light, parts
+    found = (
+        _band_gradients(records, tiles, band, image, light, g_image, g_light, columns)
+        for band in tiles.bands()
     )
-    _sum(tiles.order, tiles.first_pair, tiles.end_pair, records, parts, gradients)
+    gradients = next(found)
+    for further in found:
+        gradients += further
+    return gradients
+
+
+def _band_gradients(
+    records: np.ndarray,
+    tiles: Tiles,
+    band: Band,
+    image: np.ndarray,
+    light: np.ndarray,
+    g_image: np.ndarray,
+    g_light: np.ndarray,
+    columns: int,
+) -> np.ndarray:
+    """What `draw_backward` returns, of the pixels of one band."""
+    parts = np.empty((band.room, columns), np.float32)
+    gradients = np.empty((len(records), columns), np.float32)
+    left, across, hands = band.left, band.across, numba.get_num_threads()
+    first_entry, entries = band.first_entry, band.entries
+    _collect_all(
+        hands, left, across, records, first_entry, entries, image, light, g_image, g_light, parts
+    )
+    _sum(tiles.order, band.first_pair, band.end_pair, records, parts, gradients)
     return gradients

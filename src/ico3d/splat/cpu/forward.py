@@ -12,7 +12,7 @@ import numpy as np
 
 from ico3d.splat import convention
 from ico3d.splat.cpu.compile import kernel, subroutine
-from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, Tiles, tiles_across, unpack_rows
+from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, Tiles, unpack_rows
 
 PIXELS = TILE_WIDTH * TILE_HEIGHT
 PLANE = BLOCK * PIXELS + 48
@@ -93,17 +93,17 @@ def _blend(state, first, end, splat):
 
 
 @subroutine()
-def window(image, block, across):
-    """The part of an image (H, W, ...) that a block of tiles covers."""
-    left, top = block * BLOCK % across * TILE_WIDTH, block * BLOCK // across * TILE_HEIGHT
-    return image[top : top + TILE_HEIGHT, left : left + BLOCK * TILE_WIDTH]
+def window(image, block, left, across):
+    """The part of an image (H, W, ...) that a block of a band covers, which begins at `left`."""
+    x, y = (left + block * BLOCK % across) * TILE_WIDTH, block * BLOCK // across * TILE_HEIGHT
+    return image[y : y + TILE_HEIGHT, x : x + BLOCK * TILE_WIDTH]
 
 
 @subroutine()
-def first_center(tile, across):
-    """Pixel coordinates of the centre of a tile's first pixel."""
-    left, top = tile % across * TILE_WIDTH, tile // across * TILE_HEIGHT
-    return np.float32(left) + HALF, np.float32(top) + HALF
+def first_center(tile, left, across):
+    """Pixel coordinates of the centre of the first pixel of a band's tile."""
+    x, y = (left + tile % across) * TILE_WIDTH, tile // across * TILE_HEIGHT
+    return np.float32(x) + HALF, np.float32(y) + HALF
 
 
 @subroutine()
@@ -159,8 +159,8 @@ def _draw(state, records, entries, center, splats):
 
 
 @kernel(parallel=True)
-def _draw_all(hands, across, records, first_entry, entries, image, light):
-    """Draws all blocks; each thread takes every `hands`-th."""
+def _draw_all(hands, left, across, records, first_entry, entries, image, light):
+    """Draws all blocks of a band; each thread takes every `hands`-th."""
     for hand in numba.prange(hands):
         state, splats = np.empty(4 * PLANE, np.float32), np.empty((CHECK, 9), np.float32)
         for block in range(hand, first_entry.size // BLOCK, hands):
@@ -169,8 +169,9 @@ def _draw_all(hands, across, records, first_entry, entries, image, light):
             for i in range(BLOCK):
                 tile = block * BLOCK + i
                 some = entries[first_entry[tile] : first_entry[tile + 1]]
-                _draw(state[i * PIXELS :], records, some, first_center(tile, across), splats)
-            _write(state, window(image, block, across), window(light, block, across))
+                center = first_center(tile, left, across)
+                _draw(state[i * PIXELS :], records, some, center, splats)
+            _write(state, window(image, block, left, across), window(light, block, left, across))
 
 
 @kernel()
@@ -220,7 +221,8 @@ def draw(records: np.ndarray, tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
     """
     image = np.empty((tiles.height, tiles.width, 3), np.float32)
     light = np.empty((tiles.height, tiles.width), np.float32)
-    across = tiles_across(tiles.width)
     hands = numba.get_num_threads()  # not in the kernel, which could not be cached then
-    _draw_all(hands, across, records, tiles.first_entry, tiles.entries, image, light)
+    for band in tiles.bands():
+        left, across, first_entry = band.left, band.across, band.first_entry
+        _draw_all(hands, left, across, records, first_entry, band.entries, image, light)
     return image, light

@@ -5,7 +5,9 @@
 # pyright: reportUnknownMemberType=false
 # (numba finds the types of a kernel's arguments when it is called)
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from math import floor, log, sqrt
 
 import numba
@@ -34,18 +36,21 @@ DIGIT = 11
 """Bits that one pass of the radix sort takes."""
 
 
+MOST_PAIRS = 1 << 24
+"""Pairs that a band has at most, if it is wider than a block: 0.4 GB while it is made."""
+
+
 @dataclass
-class Tiles:
-    """The splats that each tile of a picture shows.
+class Band:
+    """The splats that each tile shows, in some columns of tiles of a picture.
 
     A *pair* is one splat in one tile. All pairs of a splat have consecutive numbers, so that the
     splat's gradient is always summed in the same order, whichever thread computed the parts.
 
     Attributes:
-        width: Image width in pixels.
-        height: Image height in pixels.
-        order: (N,) uint32, the splats front to back.
-        first_pair: (N,) int32, number of the first pair of each splat in `order`.
+        left: First column of tiles.
+        across: Number of columns.
+        first_pair: (N,) int32, number of the first pair of each splat, front to back.
         end_pair: (N,) int32, number behind its last pair.
         room: Number behind the last pair of all; some before it stand for no pair.
         first_entry: (tiles + 1,) int32, index into `entries` at which a tile's begin.
@@ -53,9 +58,8 @@ class Tiles:
             that it touches (from `pack_rows`), number of the pair.
     """
 
-    width: int
-    height: int
-    order: np.ndarray
+    left: int
+    across: int
     first_pair: np.ndarray
     end_pair: np.ndarray
     room: int
@@ -63,9 +67,44 @@ class Tiles:
     entries: np.ndarray
 
 
+@dataclass
+class Tiles:
+    """The splats that each tile of a picture shows, in bands that stand side by side.
+
+    Nearly all pictures are one band. Where splats have so many pairs that they would fill the
+    memory, there are several, of which one is kept and the others are made when they are drawn.
+
+    Attributes:
+        width: Image width in pixels.
+        height: Image height in pixels.
+        order: (N,) uint32, the splats front to back.
+        splats: (N, 8) float32, what binning reads of them, front to back.
+        borders: Columns of tiles at which the bands begin, and the number of columns.
+        first: The band at the left.
+    """
+
+    width: int
+    height: int
+    order: np.ndarray
+    splats: np.ndarray
+    borders: list[int]
+    first: Band
+
+    def bands(self) -> Iterator[Band]:
+        """All bands, from left to right."""
+        yield self.first
+        for left, right in pairwise(self.borders[1:]):
+            yield _band(self.order, self.splats, left, right, tiles_down(self.height))
+
+
 def tiles_across(width: int) -> int:
     """Number of tiles in a row of a picture that is `width` pixels wide."""
     return -(-width // (TILE_WIDTH * BLOCK)) * BLOCK
+
+
+def tiles_down(height: int) -> int:
+    """Number of rows of tiles in a picture that is `height` pixels high."""
+    return -(-height // TILE_HEIGHT)
 
 
 @subroutine()
@@ -92,32 +131,35 @@ def _whole(number, least, most):
 
 
 @subroutine()
-def _span(low, high, tile, count):
-    """First and end of the `count` tiles that the pixel range [low, high] touches; first ≤ end."""
-    first = _whole(low / tile, 0, count)
-    return first, _whole(high / tile, first - 1, count - 1) + 1
+def _span(low, high, tile, least, end):
+    """First and end of those tiles from `least` on that the pixel range [low, high] touches.
+
+    The first one is never greater than the end.
+    """
+    first = _whole(low / tile, least, end)
+    return first, _whole(high / tile, first - 1, end - 1) + 1
 
 
 @subroutine()
-def _columns(splat, across):
-    """First and end column of tiles of a splat's box."""
+def _columns(splat, left, right):
+    """First and end column of tiles of a splat's box in the band from `left` to `right`."""
     reach = splat[6] + SLACK
-    return _span(splat[0] - reach, splat[0] + reach, TILE_WIDTH, across)
+    return _span(splat[0] - reach, splat[0] + reach, TILE_WIDTH, left, right)
 
 
 @subroutine()
 def _rows(splat, down):
     """First and end row of tiles of a splat's box."""
     reach = splat[7] + SLACK
-    return _span(splat[1] - reach, splat[1] + reach, TILE_HEIGHT, down)
+    return _span(splat[1] - reach, splat[1] + reach, TILE_HEIGHT, 0, down)
 
 
 @subroutine()
-def _most_pairs(splat, across, down):
-    """How many pairs a splat has at most: the tiles of its box."""
-    left, right = _columns(splat, across)
+def _most_pairs(splat, left, right, down):
+    """How many pairs a splat has at most in a band: the tiles of its box."""
+    first, end = _columns(splat, left, right)
     top, bottom = _rows(splat, down)
-    return (right - left) * (bottom - top)
+    return (end - first) * (bottom - top)
 
 
 @kernel()
@@ -136,20 +178,24 @@ def _pack(means, conics, alphas, extents, splats):
 
 
 @kernel(parallel=True)
-def _sort(parts, order, splats, across, down, ordered):
-    """Copies packed splats front to back, in a loop without branches that wait for memory.
+def _sort(order, splats, ordered):
+    """Copies packed splats front to back, in a loop without branches that wait for memory."""
+    for part in numba.prange(PARTS):
+        count = order.size
+        for k in range(part * count // PARTS, (part + 1) * count // PARTS):
+            for j in range(8):
+                ordered[k, j] = splats[order[k], j]
 
-    Returns:
-        Where each part of the sorted splats begins to write its pairs (parts + 1,).
-    """
-    rooms, count = np.zeros(parts + 1, np.int64), order.size
+
+@kernel(parallel=True)
+def _rooms(parts, ordered, left, right, down):
+    """Where each part of the sorted splats begins to write its pairs in a band (parts + 1,)."""
+    rooms, count = np.zeros(parts + 1, np.int64), ordered.shape[0]
     for part in numba.prange(parts):
         room = 0
         for k in range(part * count // parts, (part + 1) * count // parts):
             splat = ordered[k]
-            for j in range(8):
-                splat[j] = splats[order[k], j]
-            room += _most_pairs(splat, across, down) if splat[5] >= 0 else 0
+            room += _most_pairs(splat, left, right, down) if splat[5] >= 0 else 0
         rooms[part + 1] = room
     return rooms.cumsum()
 
@@ -178,7 +224,7 @@ def _reach(tip, discriminant, room, b, low, high):
 
 
 @subroutine()
-def _list(splat, number, across, down, pair, counts, pairs):
+def _list(splat, number, left, right, down, pair, counts, pairs):
     """Lists the tiles of a splat and the rows it touches there, from pair `pair` on.
 
     What lies outside of the box is left out, so that the pairs fit into the room for them: the
@@ -191,10 +237,10 @@ def _list(splat, number, across, down, pair, counts, pairs):
     x, y, p, b, q = splat[0] - 0.5, splat[1] - 0.5, 0.5 * splat[2], 1.0 * splat[3], 0.5 * splat[4]
     tip, scale = -0.5 * b / p * splat[7], 0.5 / q
     discriminant, room = b * b - 4 * p * q, 4 * q * splat[5]
-    left, right = _columns(splat, across)
+    first_column, end_column = _columns(splat, left, right)
     upper, lower = _rows(splat, down)
     highest, lowest = upper * TILE_HEIGHT, lower * TILE_HEIGHT
-    for column in range(left, right):
+    for column in range(first_column, end_column):
         low = column * TILE_WIDTH - x - SLACK
         high = low + TILE_WIDTH - 1 + 2 * SLACK
         top, bottom = _reach(tip, discriminant, room, b, low, high)
@@ -203,7 +249,7 @@ def _list(splat, number, across, down, pair, counts, pairs):
         if first < end:
             for row in range(first // TILE_HEIGHT, (end - 1) // TILE_HEIGHT + 1):
                 above = row * TILE_HEIGHT
-                tile = row * across + column
+                tile = row * (right - left) + column - left
                 counts[tile] += 1
                 pairs[pair, 0], pairs[pair, 1] = tile, number
                 pairs[pair, 2] = pack_rows(max(first - above, 0), min(end - above, TILE_HEIGHT))
@@ -212,7 +258,7 @@ def _list(splat, number, across, down, pair, counts, pairs):
 
 
 @kernel(parallel=True)
-def _list_all(rooms, order, ordered, across, down, starts, ends, counts, pairs):
+def _list_all(rooms, order, ordered, left, right, down, starts, ends, counts, pairs):
     """Lists the tiles of all splats, front to back, each part of the splats by one thread.
 
     `counts` (parts, tiles) gets the number of pairs in each tile, `pairs` (P, 3) tile, splat, rows.
@@ -227,7 +273,8 @@ def _list_all(rooms, order, ordered, across, down, starts, ends, counts, pairs):
         for k in range(part * count // parts, (part + 1) * count // parts):
             starts[k] = pair
             if ordered[k, 5] >= 0:
-                pair = _list(ordered[k], order[k], across, down, pair, counts[part], pairs)
+                splat, own = ordered[k], counts[part]
+                pair = _list(splat, order[k], left, right, down, pair, own, pairs)
             ends[k] = pair
         behind[part] = pair
     return behind
@@ -282,6 +329,28 @@ def _fill(rooms, behind, pairs, following, entries):
             entries[entry, 2] = pair
 
 
+def _ends(splats: np.ndarray, left: int, right: int, down: int) -> list[int]:
+    """Columns at which bands end that have no more than `MOST_PAIRS`, unless they are one block."""
+    if right - left <= BLOCK or _rooms(PARTS, splats, left, right, down)[-1] <= MOST_PAIRS:
+        return [right]
+    middle = left + (right - left) // (2 * BLOCK) * BLOCK
+    return _ends(splats, left, middle, down) + _ends(splats, middle, right, down)
+
+
+def _band(order: np.ndarray, splats: np.ndarray, left: int, right: int, down: int) -> Band:
+    """The tiles of the columns from `left` to `right`; `splats` are packed, front to back."""
+    rooms, across = _rooms(PARTS, splats, left, right, down), right - left
+    pairs = np.empty((rooms[-1], 3), np.int32)
+    starts, ends = np.empty(len(order), np.int32), np.empty(len(order), np.int32)
+    counts = np.zeros((PARTS, across * down), np.int32)
+    behind = _list_all(rooms, order, splats, left, right, down, starts, ends, counts, pairs)
+    first_entry = np.empty(across * down + 1, np.int32)
+    _first_entries(counts, first_entry)
+    entries = np.empty((first_entry[-1], 3), np.int32)
+    _fill(rooms, behind, pairs, counts, entries)
+    return Band(left, across, starts, ends, len(pairs), first_entry, entries)
+
+
 def bin_splats(
     means2d: np.ndarray,
     conics: np.ndarray,
@@ -305,17 +374,11 @@ def bin_splats(
     Returns:
         The tiles.
     """
-    across, down = tiles_across(width), -(-height // TILE_HEIGHT)
+    across, down = tiles_across(width), tiles_down(height)
     order, count = _order(depths), len(means2d)
     splats, ordered = np.empty((count, 8), np.float32), np.empty((count, 8), np.float32)
     _pack(means2d, conics, alphas, extents, splats)
-    rooms = _sort(PARTS, order, splats, across, down, ordered)
-    pairs = np.empty((rooms[-1], 3), np.int32)
-    starts, ends = np.empty(count, np.int32), np.empty(count, np.int32)
-    counts = np.zeros((PARTS, across * down), np.int32)
-    behind = _list_all(rooms, order, ordered, across, down, starts, ends, counts, pairs)
-    first_entry = np.empty(across * down + 1, np.int32)
-    _first_entries(counts, first_entry)
-    entries = np.empty((first_entry[-1], 3), np.int32)
-    _fill(rooms, behind, pairs, counts, entries)
-    return Tiles(width, height, order, starts, ends, len(pairs), first_entry, entries)
+    _sort(order, splats, ordered)
+    ends = _ends(ordered, 0, across, down)
+    first = _band(order, ordered, 0, ends[0], down)
+    return Tiles(width, height, order, ordered, [0, *ends], first)
