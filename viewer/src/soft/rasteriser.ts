@@ -42,6 +42,7 @@ export interface Steps {
 }
 
 const PAIRS = 1 << 18;
+const MOST_PAIRS = 1 << 23; // 0.1 GB; what lies behind so many is left out, which takes tens of thousands of Gaussians that cover the band
 
 /** Draws pictures of sources, in the kernel's memory. */
 export class Rasteriser {
@@ -98,7 +99,7 @@ export class Rasteriser {
     const behind = this.behind.at(stride * frame.height);
     if (cloth !== before) this.spread(cloth, behind, stride, frame.height);
     const spread = performance.now();
-    while (!kernel.bin()) {
+    while (!kernel.bin(Number(this.room.pairs < MOST_PAIRS))) {
       this.room.pairs *= 2;
       this.room.gaussians = 0;
       this.layOut(frame);

@@ -71,6 +71,22 @@ describe('the rasteriser', () => {
     expect(bytes[1]).toBe(bytes[0]);
   });
 
+  test('leaves out the farthest of Gaussians that would fill the memory', async () => {
+    const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
+    const [pictures, bytes] = [[] as Uint8Array[], [] as number[]];
+    for (const count of [100, 60_000]) {
+      const rows = new Float32Array(16 * count);
+      for (let i = 0; i < count; i++) rows.set([0, 0, 2 + i * 1e-5, 1, 0, 0, 0, 10, 10, 10, 0.5, 0.4, 0.3, 0.9, 0, 0], 16 * i);
+      const kernel = await makeKernel();
+      const one = new Rasteriser(kernel);
+      one.put(0, { kind: 'still', count, rows: rows.buffer, sizes: [] });
+      pictures.push(draw({ ...frame(0, COLUMNS), placed: [{ id: 0, view, drawn: count, values: new Float32Array(0) }] }, one));
+      bytes.push(kernel.memory.buffer.byteLength);
+    }
+    expect(worst(pictures[1]!, pictures[0]!)).toBe(0);
+    expect(bytes[1]! - bytes[0]!).toBeLessThan(3e8);
+  });
+
   test('lists no Gaussian more often than there are tiles, whatever its numbers are', async () => {
     const [kernel, rows] = [await makeKernel(), Math.ceil(HEIGHT / TILE_HEIGHT)];
     const [view, at] = [kernel.reserve(48), kernel.reserve(64)];
@@ -88,7 +104,7 @@ describe('the rasteriser', () => {
             kernel.fade(1, 1);
             kernel.addStill(view, at, 1);
             seen += kernel.seen();
-            expect(kernel.bin(), `${x}, ${y}, ${wide}, ${high}`).toBe(1);
+            expect(kernel.bin(1), `${x}, ${y}, ${wide}, ${high}`).toBe(1);
           }
     expect(seen).toBeGreaterThan(100);
   });

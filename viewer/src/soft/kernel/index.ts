@@ -53,11 +53,16 @@ export function begin(fx: f32, fy: f32, cx: f32, cy: f32, width: i32, newHeight:
   beginProjection(fx, fy, cx, cy, <f32>width, <f32>newHeight, <f32>(first * TILE_WIDTH), <f32>min(width, end * TILE_WIDTH));
 }
 
-/** Sorts the splats of this picture into tiles; false where there was no room for all pairs. */
-export function bin(): bool {
+/**
+ * Sorts the splats of this picture into tiles.
+ *
+ * @param all whether all pairs are wanted; else the farthest are left out where there is no room
+ * @returns false where there was no room for all
+ */
+export function bin(all: bool): bool {
   const down = (height + TILE_HEIGHT - 1) / TILE_HEIGHT;
   sortByDepth(order, spare);
-  const number = listPairs(spare, pairs, mostPairs, counts, firstColumn, endColumn, down);
+  const number = listPairs(spare, pairs, mostPairs, all, counts, firstColumn, endColumn, down);
   if (number > mostPairs) return false;
   fillTiles(pairs, number, counts, (endColumn - firstColumn) * down, entries);
   return true;

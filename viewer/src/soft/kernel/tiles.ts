@@ -82,9 +82,10 @@ function whole(number: f32, least: i32, most: i32): i32 {
  * @param pairs gets 8 bytes each: tile, entry
  * @param most pairs for which there is room
  * @param counts u32 for each tile of the band, written
- * @returns number of the pairs; more than `most` where room is lacking
+ * @param all whether all pairs are wanted; else those are left out, farthest ones first, for which there is no room
+ * @returns number of the pairs; more than `most` where room is lacking for all
  */
-export function listPairs(order: usize, pairs: usize, most: u32, counts: usize, firstColumn: i32, endColumn: i32, down: i32): u32 {
+export function listPairs(order: usize, pairs: usize, most: u32, all: bool, counts: usize, firstColumn: i32, endColumn: i32, down: i32): u32 {
   memory.fill(counts, 0, 4 * <usize>((endColumn - firstColumn) * down));
   let number: u32 = 0;
   for (let i: usize = 0; i < <usize>count; i++) {
@@ -108,7 +109,7 @@ export function listPairs(order: usize, pairs: usize, most: u32, counts: usize, 
     const to = whole((x + HALF + reachX) * (ONE / <f32>TILE_WIDTH), from - 1, endColumn - 1) + 1;
     const upper = whole((y + HALF - reachY) * (ONE / <f32>TILE_HEIGHT), 0, down);
     const lower = whole((y + HALF + reachY) * (ONE / <f32>TILE_HEIGHT), upper - 1, down - 1) + 1;
-    if (number + <u32>((to - from) * (lower - upper)) > most) return most + 1;
+    if (number + <u32>((to - from) * (lower - upper)) > most) return all ? most + 1 : number;
     const highest = upper * TILE_HEIGHT;
     const lowest = lower * TILE_HEIGHT;
     for (let column = from; column < to; column++) {
