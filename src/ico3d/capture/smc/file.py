@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ico3d.capture.extras import hdf5
+from ico3d.capture.smc.unpacking import first_bytes, is_bounded
 from ico3d.errors import CaptureError
 
 PURPOSE = "reading SMC files"
@@ -19,6 +20,8 @@ LARGEST = 256 * 2**20
 
 A damaged header can claim any number, and what was never written takes no bytes of the file.
 """
+LARGEST_PICTURE = 64 * 2**20
+"""The same of an encoded picture; 4096 × 3000 pixels take 37 MB where nothing packs them."""
 MOST_ROWS = 100_000
 """Largest number of frames, and of rows of a table where any number is allowed."""
 MOST_VALUES = 16
@@ -96,7 +99,7 @@ class SmcFile:
         Raises:
             CaptureError: If the file or the dataset is damaged.
         """
-        values = self._read(inside)
+        values = self._read(inside, LARGEST_PICTURE)
         if values is None:
             return None
         if values.dtype != np.uint8 or values.ndim != 1:
@@ -115,8 +118,12 @@ class SmcFile:
         """
         with self._guard(inside):
             node = self._dataset(inside)
-            plain = node is not None and node.dtype == np.uint8 and node.ndim == 1
-            return node[:count].tobytes() if plain else b""
+            if node is None or node.dtype != np.uint8 or node.ndim != 1:
+                return b""
+            found = first_bytes(node, count)
+        if found is None:
+            raise self._damaged(inside)
+        return found
 
     def numbers(
         self, inside: str, shape: tuple[int | None, ...] | None, holes: bool = False
@@ -142,7 +149,7 @@ class SmcFile:
                 )
             if math.prod(node.shape) > LARGEST // np.dtype(np.float64).itemsize:
                 raise self._damaged(inside)
-            values = np.asarray(node[()])
+            values = self._values(node, inside)
         if values.dtype.kind not in "fiub" or not _sound(values, holes):
             raise CaptureError(f"{self.path}: {inside} holds values that are no finite numbers.")
         return values.astype(np.float64)
@@ -164,13 +171,19 @@ class SmcFile:
             raise self._damaged(inside)
         return values
 
-    def _read(self, inside: str) -> np.ndarray | None:
-        """A whole dataset."""
+    def _read(self, inside: str, most: int = LARGEST) -> np.ndarray | None:
+        """A whole dataset, of so many bytes at most."""
         with self._guard(inside):
-            node = self._dataset(inside)
-            return None if node is None else np.asarray(node[()])
+            node = self._dataset(inside, most)
+            return None if node is None else self._values(node, inside)
 
-    def _dataset(self, inside: str) -> Any:
+    def _values(self, node: Any, inside: str) -> np.ndarray:
+        """The values of a dataset, unless far more comes of what is stored than it says."""
+        if not is_bounded(node, self.path.stat().st_size):
+            raise self._damaged(inside)
+        return np.asarray(node[()])
+
+    def _dataset(self, inside: str, most: int = LARGEST) -> Any:
         """A dataset that may be read, or None if missing or empty.
 
         Its values must lie in this file, and neither they nor a piece that is unpacked for one of
@@ -182,7 +195,7 @@ class SmcFile:
         if not _is(node, "Dataset"):
             raise self._damaged(inside)
         largest = max(node.nbytes, math.prod(node.chunks or (0,)) * node.dtype.itemsize)
-        if node.external or node.is_virtual or node.dtype.hasobject or largest > LARGEST:
+        if node.external or node.is_virtual or node.dtype.hasobject or largest > most:
             raise self._damaged(inside)
         return None if node.shape is None else node
 
