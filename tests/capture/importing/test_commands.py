@@ -14,6 +14,7 @@ from PIL import Image
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.recording import _free, import_recording
 from ico3d.capture.importing.settings import ImportSettings
+from ico3d.capture.importing.transforms import read_transforms
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.cli import main
 from ico3d.errors import CaptureError, SettingsError
@@ -274,6 +275,34 @@ def test_a_picture_that_is_listed_twice_is_not_copied_for_each(tmp_path):
     names = ["a.png", "b.png", "./a.png"]
     foreign_models.write_transforms(tmp_path, foreign_models.frames(foreign_models.poses(3), names))
     fails(lambda: imported(tmp_path, tmp_path / "out"), "a.png is listed twice")
+
+
+def test_a_picture_that_is_listed_ten_thousand_times_is_refused_at_once(tmp_path):
+    """Also where the file has as many keys, and a model of COLMAP lists it."""
+    foreign_models.write_pictures(tmp_path, ["a.png"])
+    keys = {f"{number:x}": 0 for number in range(100_000)}
+    entries = foreign_models.frames(foreign_models.poses(1), ["a.png"]) * 10_000
+    foreign_models.write_transforms(tmp_path, entries, **keys)
+    begun = process_time()
+    fails(lambda: imported(tmp_path, tmp_path / "out"), "a.png is listed twice")
+    assert process_time() - begun < 2
+    root = foreign_models.write_colmap(tmp_path / "scene", foreign_models.poses(), binary=False)
+    file = root / "sparse/0/images.txt"
+    file.write_text(file.read_text() * 10_000)
+    begun = process_time()
+    fails(lambda: imported(root, tmp_path / "out"), "is listed twice")
+    assert process_time() - begun < 2
+
+
+def test_many_keys_beside_many_frames_are_read_in_linear_time(tmp_path):
+    foreign_models.write_pictures(tmp_path, [f"{number}.png" for number in range(300)])
+    poses = np.repeat(foreign_models.poses(1), 300, 0)
+    entries = foreign_models.frames(poses, [f"{number}.png" for number in range(300)])
+    keys = {f"{number:x}": 0 for number in range(200_000)}
+    foreign_models.write_transforms(tmp_path, entries, **keys)
+    begun = process_time()
+    assert len(read_transforms(tmp_path / "transforms.json").shots) == 300
+    assert process_time() - begun < 2
 
 
 def test_a_mask_of_many_pictures_is_copied_once(tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside
+from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside, take_once
 from ico3d.capture.lens import Lens
 from ico3d.common.files import MOST_BYTES, read_small
 from ico3d.errors import CaptureError
@@ -48,8 +48,9 @@ def read_colmap(model: Path, images: Path) -> Foreign:
     cameras, poses, points = (model / f"{n}.{suffix}" for n in ("cameras", "images", "points3D"))
     try:
         lenses = _binary_cameras(cameras) if binary else _text_cameras(cameras)
+        taken = set[Path]()
         shots = [
-            _shot(images, poses, lenses, pose)
+            _shot(images, poses, lenses, pose, taken)
             for pose in (_binary_poses(poses) if binary else _text_poses(poses))
         ]
         cloud = None
@@ -64,12 +65,13 @@ def read_colmap(model: Path, images: Path) -> Foreign:
     return Foreign("COLMAP", shots, cloud, axes_mean_up=False)
 
 
-def _shot(images: Path, poses: Path, lenses: dict[int, Lens], pose: Pose) -> Shot:
+def _shot(images: Path, poses: Path, lenses: dict[int, Lens], pose: Pose, taken: set[Path]) -> Shot:
     """A picture of the model with its pose and lens."""
     name, camera, numbers = pose
     if camera not in lenses:
         raise CaptureError(f"{poses}: {name} names camera {camera}, which does not exist.")
     file = inside(images, name, str(poses))
+    take_once(file, taken, str(poses))
     return Shot(file, fitted(lenses[camera], file), _camera_to_world(numbers, f"{poses}: {name}"))
 
 

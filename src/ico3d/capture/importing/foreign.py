@@ -74,6 +74,24 @@ def inside(folder: Path, name: str, what: str) -> Path:
     return found
 
 
+def take_once(file: Path, taken: set[Path], what: str) -> None:
+    """Each picture belongs to one camera and one time; a copy for each would fill the disk.
+
+    It is asked for before anything else is done for the picture: millions may name one.
+
+    Args:
+        file: The picture.
+        taken: Those before it, to which it is added.
+        what: Name of the file that lists them, for errors.
+
+    Raises:
+        CaptureError: If it is among them.
+    """
+    if file in taken:
+        raise CaptureError(f"{what}: the picture {file} is listed twice.")
+    taken.add(file)
+
+
 def fitted(lens: Lens, file: Path) -> Lens:
     """A lens, rescaled to the actual size of a picture; calibrations often use another size.
 

@@ -44,7 +44,6 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
         CaptureError: If `out` exists, the source is of an unknown kind, or a file is damaged.
     """
     foreign = _read(source, settings.images)
-    _check_once(foreign)
     cameras, frames = _grouped(foreign)
     turn = _upright(foreign)
     places = tuple(
@@ -81,18 +80,6 @@ def _read(source: Path, images: Path | None) -> Foreign:
             "images.bin, or .txt)."
         )
     return read_colmap(model, images or _images_near(source, model))
-
-
-def _check_once(foreign: Foreign) -> None:
-    """Each picture belongs to one camera and one time; a copy for each would fill the disk.
-
-    Raises:
-        CaptureError: If one is listed twice.
-    """
-    counts = Counter(shot.file for shot in foreign.shots)
-    doubled = next((file for file, count in counts.items() if count > 1), None)
-    if doubled is not None:
-        raise CaptureError(f"{foreign.tool}: the picture {doubled} is listed twice.")
 
 
 def _images_near(source: Path, model: Path) -> Path:

@@ -1,12 +1,14 @@
 """Reads `transforms.json` of nerfstudio and instant-ngp (nerfstudio's "Data conventions")."""
 
+from collections import ChainMap
+from collections.abc import Mapping
 from math import tan
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.capture.decoding import size_of
-from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside
+from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside, take_once
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import matrix, number, read_json
 from ico3d.capture.poses import rigid
@@ -31,19 +33,21 @@ def read_transforms(file: Path) -> Foreign:
     frames = content.get("frames")
     if not isinstance(frames, list) or not frames:
         raise CaptureError(f"{file} lists no frames.")
-    shots = [_shot(file, content, index, frame) for index, frame in enumerate(frames)]
+    taken = set[Path]()
+    shots = [_shot(file, content, index, frame, taken) for index, frame in enumerate(frames)]
     if len({shot.time is None for shot in shots}) > 1:
         raise CaptureError(f"{file}: some frames have a time and others none.")
     return Foreign("transforms.json", shots, None, axes_mean_up=True)
 
 
-def _shot(file: Path, content: dict, index: int, frame: object) -> Shot:
+def _shot(file: Path, content: dict, index: int, frame: object, taken: set[Path]) -> Shot:
     """One entry of `frames` as a picture with its pose and lens."""
     where = f"{file}: frame {index}"
     if not isinstance(frame, dict) or not isinstance(frame.get("file_path"), str):
         raise CaptureError(f"{where} has no file_path.")
     picture = inside(file.parent, frame["file_path"], where)
-    merged = {**content, **frame}
+    take_once(picture, taken, str(file))
+    merged = ChainMap(frame, content)  # a copy for each frame would take the square of the file
     pose = rigid(_pose(frame, where), where) @ OPENGL_FROM_OPENCV
     named = frame.get("mask_path")
     mask = inside(file.parent, named, where) if isinstance(named, str) else None
@@ -58,7 +62,7 @@ def _pose(frame: dict, where: str) -> np.ndarray:
     return matrix({"transform_matrix": whole}, "transform_matrix", where, 4)
 
 
-def _lens(merged: dict, picture: Path, where: str) -> Lens:
+def _lens(merged: Mapping, picture: Path, where: str) -> Lens:
     """The lens of a frame."""
     model = merged.get("camera_model", "OPENCV")
     if model not in STRAIGHT_OR_RADIAL or merged.get("is_fisheye"):
@@ -83,6 +87,6 @@ def _lens(merged: dict, picture: Path, where: str) -> Lens:
     return Lens(picture.stem, int(width), int(height), intrinsics, bent)
 
 
-def _focal(merged: dict, key: str, size: float, where: str) -> float:
+def _focal(merged: Mapping, key: str, size: float, where: str) -> float:
     """Focal length in pixels from the angle that the picture spans."""
     return 0.5 * size / tan(0.5 * number(merged, key, where, 1e-4, 3.14))

@@ -3,6 +3,7 @@
 import json
 import re
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -130,7 +131,7 @@ def read_json(file: Path) -> dict:
     return content
 
 
-def number(entry: dict, key: str, where: str, least: float, most: float) -> float:
+def number(entry: Mapping, key: str, where: str, least: float, most: float) -> float:
     """A number in a JSON object.
 
     Args:
