@@ -45,12 +45,12 @@ class SyntheticCapture(RecordedCapture):
         self.blendshape_names = tuple(about["blendshape_names"])
         self.cameras = tuple(_camera(c, path) for c in about["cameras"])
         self.shows = "body" if about.get("shows", "head") == "body" else "head"
+        self._frames = self._read_frames()  # has a row for each frame that is claimed
         self.split = (
             all_frames(self.num_frames, self.cameras)
             if self.shows == "body"
             else last_eleventh(self.num_frames)
         )
-        self._frames = self._read_frames()
 
     @property
     def phonemes(self) -> tuple[tuple[float, str], ...]:

@@ -54,7 +54,7 @@ class DnaRendering(SmcCapture):
         self._devices, lost = read_devices(self._main, self._annotations)
         if lost:
             log.warning("%s: cameras without calibration left out: %s", path, ", ".join(lost))
-        count = count_frames(self._main, GROUPS, self._devices[0].pictures)
+        count = count_frames(self._main, GROUPS, [d.pictures for d in self._devices])
         super().__init__(files.main, self._devices, count)
         self.split = all_frames(self.num_frames, self.cameras)
 

@@ -18,6 +18,7 @@ from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.capture.multiview.writing import shown
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
+from ico3d.capture.vetting.claims import MOST_GAPS
 from ico3d.capture.writing.new_folder import new_folder
 from ico3d.errors import CaptureError
 
@@ -25,8 +26,6 @@ NEARLY = np.cos(np.radians(20))
 """Cosine of the angle (20°) up to which an axis of the source counts as the upward direction."""
 UNEVEN = 0.1
 """Share of a frame's duration by which times may deviate from an even rate."""
-MOST_GAPS = 10
-"""Largest number of frames of a recording, per frame that has a picture."""
 
 
 def import_recording(source: Path, out: Path, settings: ImportSettings) -> Description:

@@ -33,6 +33,15 @@ class RecordedFiles:
         """The video of a camera, or None for a camera with single pictures."""
         return self._clips[camera]
 
+    def count(self, camera: int) -> int:
+        """Number of pictures of a camera; of files, those whose names are numbers of frames.
+
+        Raises:
+            CaptureError: If the camera's video cannot be read.
+        """
+        clip = self._clips[camera]
+        return len(self._numbered("images", camera)) if clip is None else clip.count
+
     def has_picture(self, camera: int, frame: int) -> bool:
         """Whether `picture` would return one; nothing is decoded."""
         clip = self._clips[camera]
@@ -89,11 +98,7 @@ class RecordedFiles:
             camera: The camera.
             frames: Numbers from here on are left out.
         """
-        try:
-            with os.scandir(self.folder / kind / self._lenses[camera].name) as entries:
-                found = {int(m[1]) for e in entries if (m := _FRAME.fullmatch(e.name))}
-        except OSError:
-            return set()
+        found = self._numbered(kind, camera)
         return {n for n in found if n < frames and self.file(kind, camera, n) is not None}
 
     def is_damaged(self, kind: str, camera: int, frame: int) -> bool:
@@ -103,6 +108,14 @@ class RecordedFiles:
             return file is not None and size_of(file, "") != (lens.width, lens.height)
         except CaptureError:
             return True
+
+    def _numbered(self, kind: str, camera: int) -> set[int]:
+        """Numbers of frames that are names in the folder of a camera; it is read once."""
+        try:
+            with os.scandir(self.folder / kind / self._lenses[camera].name) as entries:
+                return {int(m[1]) for e in entries if (m := _FRAME.fullmatch(e.name))}
+        except OSError:
+            return set()
 
     def _find_clip(self, name: str) -> Clip | None:
         """The video of a camera unless it has pictures."""

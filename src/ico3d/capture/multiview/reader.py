@@ -16,6 +16,7 @@ from ico3d.capture.multiview.files import RecordedFiles
 from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface.head import head_hull
+from ico3d.capture.vetting.claims import check_claimed
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
@@ -33,13 +34,16 @@ class MultiviewCapture(RecordedCapture):
         """Opens a folder; pictures are read when asked for.
 
         Raises:
-            CaptureError: If `cameras.json` is damaged or a camera has no pictures.
+            CaptureError: If `cameras.json` is damaged or claims far more frames than there are
+                pictures, or a camera has none.
         """
         self.path = path
         self._about = read_description(path)
         self.fps, self.num_frames = self._about.fps, self._about.num_frames
         self.lenses: list[Lens] = [place.lens for place in self._about.places]
         self.files = RecordedFiles(path, self.lenses)
+        counts = map(self.files.count, range(len(self.lenses)))
+        check_claimed(self.num_frames, counts, str(path))
         self.cameras = tuple(
             Camera(
                 place.lens.width,

@@ -18,6 +18,7 @@ from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_cla
 from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface.first_points import unknown_person
+from ico3d.capture.vetting.claims import check_claimed
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
@@ -53,10 +54,13 @@ class TalkingPortrait(RecordedCapture):
             for frame in part["frames"]
         }
         listed = max(self._poses) + 1
-        counted = {"fps": FPS, "num_frames": max(listed, self._count_pictures())} | self._details
+        pictures = _numbers(path / "ori_imgs", ".jpg")
+        known = max(listed, max(pictures, default=-1) + 1)
+        counted = {"fps": FPS, "num_frames": known} | self._details
         where = str(path / DETAILS)
         self.fps = number(counted, "fps", where, 1e-3, 1e3)
         self.num_frames = int(number(counted, "num_frames", where, listed, MOST_FRAMES))
+        check_claimed(self.num_frames, [max(len(pictures), len(self._poses))], str(path))
         self.cameras = (self._camera(parts["train"]),)
         self.blendshape_names = self._names()
         _check_ids(path, sorted(self._poses))
@@ -217,10 +221,6 @@ class TalkingPortrait(RecordedCapture):
                 f"found shape {self._blendshapes.shape}."
             )
         return names
-
-    def _count_pictures(self) -> int:
-        """One more than the highest number among the pictures."""
-        return max(_numbers(self.path / "ori_imgs", ".jpg"), default=-1) + 1
 
     def _camera(self, transforms: dict) -> Camera:
         """The steady camera; it is the world."""

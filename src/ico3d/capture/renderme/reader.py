@@ -65,7 +65,7 @@ class RenderMe360(SmcCapture):
         self._devices, lost = read_cameras(self._raw, self._holding("Calibration"))
         if lost:
             log.warning("%s: cameras without calibration left out: %s", path, ", ".join(lost))
-        count = count_frames(self._raw, ["Camera"], self._devices[0].pictures)
+        count = count_frames(self._raw, ["Camera"], [d.pictures for d in self._devices])
         super().__init__(files.raw, self._devices, count)
         self.fps = frame_rate(files.part, self._devices, count, self._seconds())
         self.split = last_eleventh(count)

@@ -13,6 +13,7 @@ from ico3d.capture.headpose.from_landmarks import HeadMotion, head_from_landmark
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.capture.smc.cameras import SmcCamera
 from ico3d.capture.smc.file import MOST_ROWS, SmcFile
+from ico3d.capture.vetting.claims import check_claimed
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
@@ -107,25 +108,26 @@ class SmcCapture(RecordedCapture):
         return Camera(lens.width, lens.height, lens.straight_intrinsics, inverse, device.name)
 
 
-def count_frames(file: SmcFile, groups: Sequence[str], pictures: str) -> int:
+def count_frames(file: SmcFile, groups: Sequence[str], pictures: Sequence[str]) -> int:
     """Number of frames that a file announces, or else that the first camera has.
 
     Args:
         file: The file with the pictures.
         groups: Groups whose attribute `num_frame` announces a number.
-        pictures: Path of the group with the first camera's pictures.
+        pictures: Path of the group with each camera's pictures.
 
     Raises:
-        CaptureError: If the announced number is damaged.
+        CaptureError: If the announced number is damaged, or there are far fewer pictures.
     """
     announced = [file.attribute(group, "num_frame") for group in groups]
     try:
         counts = [int(np.asarray(value).reshape(())) for value in announced if value is not None]
     except (TypeError, ValueError) as error:
         raise CaptureError(f"{file.path}: num_frame is damaged: fetch it again.") from error
-    count = max(counts) if counts else len(file.keys(pictures))
+    count = max(counts) if counts else len(file.keys(pictures[0]))
     if not 1 <= count <= MOST_ROWS:
         raise CaptureError(f"{file.path} announces {count} frames: fetch it again.")
+    check_claimed(count, (len(file.keys(folder)) for folder in pictures), str(file.path))
     return count
 
 
