@@ -10,6 +10,7 @@ from PIL import Image
 
 from ico3d.capture.dna.calibration import colours
 from ico3d.capture.formats import open_capture
+from ico3d.capture.smc.file import SmcFile
 from ico3d.errors import CaptureError
 from support.recordings import dna_files
 
@@ -197,6 +198,15 @@ def test_smplx_parameters_by_name(plain):
     for got, expected in zip(named, slices, strict=True):
         np.testing.assert_array_equal(got, expected)
     assert (fit.scale, fit.gender) == (1.02, "female")
+
+
+def test_keypoints_of_all_frames_are_read_once(tmp_path, monkeypatch):
+    rig = dna_files.Rig(cameras=(0, 1, 2), keypoints=np.ones((3, 133, 3)))
+    capture, asked = open_capture(dna_files.write_recording(tmp_path, rig)), []
+    numbers = SmcFile.numbers
+    monkeypatch.setattr(SmcFile, "numbers", lambda *a, **k: asked.append(a) or numbers(*a, **k))
+    assert all(len(capture.whole_body_points(frame)) == 133 for frame in range(3))
+    assert len(asked) == 1
 
 
 def test_depth_comes_as_it_was_measured(tmp_path):

@@ -107,7 +107,7 @@ class DnaRendering(SmcCapture):
 
     def keypoints_3d(self, frame: int) -> np.ndarray | None:
         """(J, 3) keypoints in the capture's world, metres, NaN where not found; None if missing."""
-        found = row(self._all_keypoints(), self.index(frame))
+        found = row(self._all_keypoints, self.index(frame))
         return None if found is None else found @ self.upright.T
 
     def whole_body_points(self, frame: int) -> np.ndarray | None:
@@ -120,7 +120,7 @@ class DnaRendering(SmcCapture):
 
     def face_points(self) -> np.ndarray | None:
         """(F, 68, 3) face keypoints of COCO-WholeBody, whose order is that of Multi-PIE, metres."""
-        table = self._all_keypoints()
+        table = self._all_keypoints
         if table is None or table.shape[1] != WHOLE_BODY:
             return None
         points = np.full((self.num_frames, len(FACE), 3), np.nan)
@@ -129,8 +129,9 @@ class DnaRendering(SmcCapture):
         points[(points == 0).all(-1)] = np.nan  # what triangulation could not find
         return points
 
+    @cached_property
     def _all_keypoints(self) -> np.ndarray | None:
-        """(T, J, 3) metres in the world of the files."""
+        """(T, J, 3) metres in the world of the files; read once, as it is asked for each frame."""
         inside = "Keypoints_3D/keypoints3d"
         return self._annotations.numbers(inside, (None, None, 3), holes=True)
 
