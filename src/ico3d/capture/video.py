@@ -11,6 +11,7 @@ from ico3d.capture import decoding
 from ico3d.capture.capture import Sound
 from ico3d.capture.decoding import check_size
 from ico3d.capture.sound import check_claim, joined
+from ico3d.capture.vetting.held import check_held, set_threads
 from ico3d.capture.vetting.promises import MOST_TRACKS, check_promises
 from ico3d.capture.vetting.rehearsal import rehearse
 from ico3d.common.sound import RECORDING, Claim
@@ -136,7 +137,8 @@ def opened(path: Path) -> Any:
 
     Raises:
         CaptureError: If the file states larger pictures than are taken (`decoding.check_size`), or
-            promises more than it can hold (`check_promises`), or costs too much (`rehearse`).
+            promises more than it can hold (`check_promises`), or costs too much (`rehearse`,
+            `check_held`).
         FFmpegError: If it is no video, or is a play list.
         OSError: If it cannot be read.
     """
@@ -155,6 +157,8 @@ def opened(path: Path) -> Any:
             if stream.codec_context is not None:
                 check_size(str(path), stream.codec_context.width, stream.codec_context.height)
                 stream.codec_context.options = pixels
+                set_threads(stream.codec_context)
+                check_held(str(path), stream.codec_context)
     except CaptureError:
         container.close()
         raise
@@ -262,6 +266,9 @@ def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
 
     Yields:
         Frames of PyAV; None for a packet that is damaged, or may hold too much sound.
+
+    Raises:
+        CaptureError: If the pictures become such that the decoder takes too much memory.
     """
     from av.error import FFmpegError
 
@@ -273,8 +280,9 @@ def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
                 return
             frames = [None] if _is_large(stream, packet) else packet.decode()
         except (FFmpegError, EOFError, OSError):
-            yield None
-            continue
+            frames = [None]
+        if stream.type == "video":
+            check_held(container.name, stream.codec_context)
         yield from frames
 
 

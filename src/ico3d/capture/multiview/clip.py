@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.capture.vetting import held
 from ico3d.capture.video import decoded_frames, opened
 from ico3d.errors import CaptureError, MissingExtraError
 
 MOST_OPEN = 4
-"""Number of decoders that are kept; each holds a dozen reference pictures."""
+"""Number of decoders that are kept, where they may take as much memory as one may."""
 
 
 class Clip:
@@ -65,6 +66,15 @@ class Clip:
         turns = frame.rotation // 90 % 4
         return np.ascontiguousarray(np.rot90(frame.to_ndarray(format="rgb24", threads=1), turns))
 
+    @property
+    def held_bytes(self) -> int:
+        """Bytes that its decoder can take: the open one, or one that is opened.
+
+        Raises:
+            CaptureError: If the file cannot be read.
+        """
+        return self._known().held_bytes if self._decoder is None else self._decoder.held_bytes
+
     def close(self) -> None:
         """Closes the file; the next call of `picture` opens it again."""
         if self._decoder is not None:
@@ -99,9 +109,14 @@ class OpenClips:
         with self._turn:
             self._used[clip.path] = clip
             self._used.move_to_end(clip.path)
-            if len(self._used) > MOST_OPEN:
+            while len(self._used) > 1 and self._are_many():
                 self._used.popitem(last=False)[1].close()
             return clip.picture(number)
+
+    def _are_many(self) -> bool:
+        """Whether the clips are more than may be open, in number or in memory."""
+        taken = sum(clip.held_bytes for clip in self._used.values())
+        return len(self._used) > MOST_OPEN or taken > held.MOST_BYTES
 
 
 class _Index:
@@ -109,7 +124,8 @@ class _Index:
 
     def __init__(self, path: Path):
         """Goes through the packets of a file without decoding them."""
-        packets = [p for p in _packets(path) if not p.is_discard]
+        found, self.held_bytes = _packets(path)
+        packets = [p for p in found if not p.is_discard]
         if not packets or any(p.pts is None for p in packets):
             raise CaptureError(
                 f"{path} does not say when its pictures are shown: convert it to MP4 with H.264."
@@ -143,6 +159,11 @@ class _Decoder:
         self._frames: Iterator[Any] = iter(())
         self._last: Any = None
         self._broken = False
+
+    @property
+    def held_bytes(self) -> int:
+        """Bytes that its pictures can take."""
+        return held.held_bytes(self._stream.codec_context)
 
     def close(self) -> None:
         """Closes the file: a container and its streams hold one another."""
@@ -198,19 +219,24 @@ def _opened(path: Path) -> Any:
     return container
 
 
-def _packets(path: Path) -> list[Any]:
-    """The packets of a file's first video stream, up to where it is damaged."""
+def _packets(path: Path) -> tuple[list[Any], int]:
+    """The packets of a file's first video stream, up to where it is damaged.
+
+    Besides, the bytes that its decoder can take.
+    """
     from av.error import FFmpegError
 
     found = []
     with _opened(path) as container:
+        stream = container.streams.video[0]
+        taken = held.held_bytes(stream.codec_context)
         try:
-            for packet in container.demux(container.streams.video[0]):
+            for packet in container.demux(stream):
                 if packet.size:
                     found.append(_Packet(packet))
         except (FFmpegError, OSError):
             pass  # what comes after the damage is missing
-    return found
+    return found, taken
 
 
 class _Packet:
