@@ -13,6 +13,7 @@ from torch import nn
 
 from ico3d.common.catalogue.table import TABLE
 from ico3d.common.downloads.fetching import sha256
+from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.weights import model_file, model_of
 from ico3d.errors import ModelError, SettingsError
 from ico3d.speech.blocks import sound_blocks
@@ -127,7 +128,9 @@ def load_ave(path: Path) -> FrozenEncoder:
     warnings.warn(TABLE["ave"].notice, stacklevel=2)
     data = _read(path)
     try:
-        state = torch.load(path, map_location="cpu", weights_only=True)
+        state = load_weights(path)
+    except ModelError:
+        raise
     except Exception as error:
         raise ModelError(f"{path} cannot be read as weights: {error}") from None
     prefix = "audio_encoder."

@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import nn
 
+from ico3d.common.unpacking.weights import check_unpacked
 from ico3d.errors import MissingExtraError, ModelError
 from ico3d.speech.blocks import PAST, ROWS, SIZE
 
@@ -49,6 +50,7 @@ def load_network(folder: Path) -> Hubert:
         from transformers import HubertModel
     except ImportError:
         raise MissingExtraError("transformers", "hubert", "the speech encoder 'hubert'") from None
+    check_unpacked(weight_file(folder))
     try:
         loaded: Any = HubertModel.from_pretrained(
             folder, local_files_only=True, output_loading_info=True, weights_only=True

@@ -76,5 +76,6 @@ def test_fewer_videos_are_open_where_they_take_more(tmp_path, monkeypatch):
     monkeypatch.setattr(Clip, "close", closed)
     for frame in (0, 3):
         for camera in range(3):
-            assert multiview_folders.number_of(capture.image(camera, frame)) == frame
+            image = capture.image(camera, frame)
+            assert image is not None and multiview_folders.number_of(image) == frame
     assert max(most) == 1

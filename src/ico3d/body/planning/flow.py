@@ -3,7 +3,7 @@
 import hashlib
 import json
 import logging
-import zipfile
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,7 @@ from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
+from ico3d.common.unpacking.npz import WIDTH, read_npz
 from ico3d.errors import CaptureError
 from ico3d.splat.initial import in_pictures, spacing
 from ico3d.training.log import progress_bar
@@ -214,6 +215,16 @@ class _Work:
         scale = min(1.0, HEIGHT / camera.height)
         return camera.resized(max(1, round(scale * camera.width)), round(scale * camera.height))
 
+    @property
+    def steps(self) -> int:
+        """S, the number of steps from frame to frame."""
+        return len(self.span) - 1
+
+    @property
+    def packed(self) -> tuple[int, int]:
+        """(h, ⌈w/8⌉), the shape of a picture's packed pixels."""
+        return self.camera.height, -(-self.camera.width // 8)
+
     def picture(self, frame: int) -> tuple[np.ndarray, np.ndarray] | None:
         """The person before black (h, w, 3) uint8, and the person's mask (h, w) bool.
 
@@ -244,10 +255,10 @@ class _Work:
 
     def measure(self) -> tuple[np.ndarray, np.ndarray]:
         """Energy (S,) and packed moving pixels (S, h, ⌈w/8⌉) of all steps."""
-        camera, steps = self.camera, len(self.span) - 1
+        camera, steps = self.camera, self.steps
         pixel = self.pixel * self.capture.cameras[self.index].height / camera.height
         energy = np.full(steps, np.nan)
-        moving = np.zeros((steps, camera.height, -(-camera.width // 8)), np.uint8)
+        moving = np.zeros((steps, *self.packed), np.uint8)
         before = self.picture(self.span.first)
         for step in range(steps):
             after = self.picture(self.span.first + step + 1)
@@ -266,7 +277,7 @@ def _cached(work: _Work, folder: Path | None) -> CameraFlow:
     if folder is None:
         return CameraFlow(work.index, work.camera, *work.measure())
     file = folder / f"{work.key()}.npz"
-    known = _load(file)
+    known = _load(file, work.steps * (1 + math.prod(work.packed)))
     if known is None:
         known = work.measure()
         energy, moving = known
@@ -274,13 +285,16 @@ def _cached(work: _Work, folder: Path | None) -> CameraFlow:
     return CameraFlow(work.index, work.camera, *known)
 
 
-def _load(file: Path) -> tuple[np.ndarray, np.ndarray] | None:
-    """Energy and moving pixels in a cached file; None where it is missing or damaged."""
+def _load(file: Path, most: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Energy and moving pixels in a cached file; None where it is missing or damaged.
+
+    It is damaged, too, if these are more than `most` numbers.
+    """
     try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return arrays["energy"], arrays["moving"]
+        arrays = read_npz(file, WIDTH * most, ("energy", "moving"))
+        return arrays["energy"], arrays["moving"]
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except (OSError, ValueError):
         logger.warning("%s is damaged; motion is measured again.", file)
         return None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ico3d.capture import extras
+from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.weights import model_folders
 
 if TYPE_CHECKING:
@@ -88,13 +89,12 @@ class RaftFlow:
             checkpoint: File of the network's state dictionary.
             device: Where to compute.
         """
-        import torch
         from torchvision.models import optical_flow
 
         self.name = checkpoint.stem
         self._device = device
         self._network = getattr(optical_flow, builder)(weights=None, progress=False)
-        self._network.load_state_dict(torch.load(checkpoint, "cpu", weights_only=True))
+        self._network.load_state_dict(load_weights(checkpoint))
         self._network.to(self._device).eval()
 
     def __call__(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import torch
 from torch import Tensor, nn
 
+from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.weights import model_file
 from ico3d.errors import ModelError
 
@@ -94,7 +94,9 @@ def load_state(network: nn.Module, path: Path) -> None:
         ModelError: If the file is none, or belongs to another network.
     """
     try:
-        network.load_state_dict(torch.load(path, map_location="cpu", weights_only=True))
+        network.load_state_dict(load_weights(path))
+    except ModelError:
+        raise
     except Exception as error:  # torch raises errors of many kinds for damaged files
         reason = str(error).strip().split("\n")[0]
         name = type(network).__name__

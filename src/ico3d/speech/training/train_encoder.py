@@ -13,6 +13,7 @@ from torch import nn
 from torch.nn import functional
 
 from ico3d.common.files import write_atomic
+from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.visemes import VISEMES
 from ico3d.errors import ModelError, SettingsError
 from ico3d.speech.articulation import ARTICULATION
@@ -113,7 +114,7 @@ class EncoderTraining:
 
     def _resume(self) -> None:
         """Takes over the checkpoint."""
-        state = torch.load(self._checkpoint, weights_only=True)
+        state = load_weights(self._checkpoint, None)
         if state["settings"] != asdict(self.settings):
             raise SettingsError(
                 f"{self._checkpoint.parent} holds a training with other settings: "

@@ -4,10 +4,6 @@ Equations of the model: Pavlakos et al., "Expressive Body Capture" (CVPR 2019), 
 "SMPL" (2015).
 """
 
-import struct
-import tokenize
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +11,7 @@ import numpy as np
 
 from ico3d.capture.posing.smplx.joints import HANDS
 from ico3d.capture.smplx import JOINTS
+from ico3d.common.unpacking.npz import LackingError, TooLargeError, read_npz
 from ico3d.errors import CaptureError
 
 COEFFICIENTS = 10
@@ -22,7 +19,7 @@ COEFFICIENTS = 10
 EXPRESSIONS_FROM = {400: 300, 20: 10}
 """First expression among the directions of shape, by the least number of directions."""
 LARGEST = 2**28
-"""Largest size of all arrays in bytes, twice what SMPL-X has; a damaged file can claim any."""
+"""Largest size of all arrays as float64, in bytes, twice what SMPL-X has."""
 ABOUT_ONE = 1e-3
 """Largest deviation of the sum of a vertex's weights from 1, and of a weight below 0."""
 SHAPES = {
@@ -36,12 +33,6 @@ SHAPES = {
     "hands_meanr": (45,),
 }
 """Shapes of the arrays that are read; a letter stands for a number that is the same everywhere."""
-DAMAGED = (
-    *(OSError, ValueError, EOFError, LookupError, TypeError, AttributeError, ArithmeticError),
-    *(RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, struct.error),
-    *(zipfile.BadZipFile, zlib.error),
-)
-"""What numpy and zipfile raise for damaged files; numpy reads an array's header as Python."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,19 +117,14 @@ def read_model(file: Path) -> BodyModel:
 def _arrays(file: Path) -> dict[str, np.ndarray]:
     """The arrays of `SHAPES`: real, finite numbers of the right shapes."""
     try:
-        with zipfile.ZipFile(file) as archive:
-            sizes = {entry.filename: entry.file_size for entry in archive.infolist()}
-        lacking = [name for name in SHAPES if f"{name}.npy" not in sizes]
-        if lacking:
-            raise _wrong(file, f"it lacks {', '.join(lacking)}")
-        if sum(sizes[f"{name}.npy"] for name in SHAPES) > LARGEST:
-            raise _wrong(file, "its arrays are larger than those of SMPL-X")
-        with np.load(file, allow_pickle=False) as content:
-            # By the whole names of what was measured: numpy prefers members that lack the ending.
-            arrays = {name: np.asarray(content[f"{name}.npy"]) for name in SHAPES}
+        arrays = read_npz(file, LARGEST, SHAPES)
     except FileNotFoundError as error:
         raise CaptureError(f"there is no SMPL-X model {file}.") from error
-    except DAMAGED as error:
+    except LackingError as error:
+        raise _wrong(file, f"it lacks {error}") from error
+    except TooLargeError as error:
+        raise _wrong(file, "its arrays are larger than those of SMPL-X") from error
+    except (OSError, ValueError) as error:
         raise _wrong(file, "it is damaged, or pickled (.pkl)") from error
     lengths: dict[str | int, int] = {}
     for name, shape in SHAPES.items():

@@ -19,6 +19,7 @@ import numpy as np
 from ico3d.chat.services.provider import Context, lacks_weights
 from ico3d.chat.services.voice.base import LOADING, PieceVoice, Spoken, at_speech_rate
 from ico3d.chat.services.voice.cloning import Recording, permitted_recording
+from ico3d.common.unpacking.weights import check_unpacked, load_weights
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
 
@@ -162,7 +163,7 @@ class Engine:
         self._target = torch.from_numpy(target).to(device)
         name = self._settings.voice.lower().replace("_", "-")
         source = model_of("openvoice") / "base_speakers" / "ses" / f"{name}.pth"
-        self._source = torch.load(source, map_location=device, weights_only=True)
+        self._source = load_weights(source, device)
         return converter
 
     def _converted(self, samples: np.ndarray, rate: int) -> tuple[np.ndarray, int]:
@@ -186,6 +187,7 @@ def load_converter(device: str) -> Any:
     from openvoice.api import ToneColorConverter
 
     converter = ToneColorConverter(str(folder / "config.json"), device=device)
+    check_unpacked(folder / "checkpoint.pth")
     converter.load_ckpt(str(folder / "checkpoint.pth"))
     return converter
 

@@ -1,0 +1,77 @@
+"""Weights that someone has packed are not unpacked: torch would do so without a bound."""
+
+import zipfile
+
+import pytest
+import torch
+
+from ico3d.common.unpacking.weights import check_unpacked, load_weights
+from ico3d.errors import ModelError
+from ico3d.measure.sync.network import load_state
+from ico3d.speech.encoder import load_ave
+from ico3d.speech.hubert import load_network
+from support.needs import needs
+
+pytestmark = pytest.mark.slow
+
+
+def packed(path, kind=zipfile.ZIP_DEFLATED):
+    """A file of weights, packed by another program."""
+    torch.save({"audio_encoder.x": torch.zeros(1 << 20)}, path.with_suffix(".whole"))
+    with (
+        zipfile.ZipFile(path.with_suffix(".whole")) as whole,
+        zipfile.ZipFile(path, "w", kind) as archive,
+    ):
+        for name in whole.namelist():
+            archive.writestr(name, whole.read(name))
+    return path
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_packed_weights_are_refused_wherever_they_are_read(tmp_path):
+    file = packed(tmp_path / "a.pth")
+    assert file.stat().st_size < 20_000
+    for read in (
+        lambda: load_weights(file),
+        lambda: load_ave(file),
+        lambda: load_state(torch.nn.Linear(1, 1), file),
+    ):
+        with pytest.raises(ModelError, match="is packed, as no file is that PyTorch writes"):
+            read()
+
+
+@needs("transformers")
+def test_hubert_is_not_unpacked(tmp_path):
+    (tmp_path / "config.json").write_text('{"model_type": "hubert"}')
+    packed(tmp_path / "pytorch_model.bin")
+    with pytest.raises(ModelError, match="is packed"):
+        load_network(tmp_path)
+
+
+def test_parts_that_overlap_are_refused(tmp_path):
+    file = packed(tmp_path / "a.pth", zipfile.ZIP_STORED)
+    check_unpacked(file)
+    data, sign = bytearray(file.read_bytes()), b"PK\1\2"
+    with zipfile.ZipFile(file) as archive:
+        parts = archive.infolist()
+    large = max(parts, key=lambda part: part.file_size)
+    place = data.index(sign)
+    for _ in parts:  # each becomes the large one
+        data[place + 20 : place + 28] = large.file_size.to_bytes(4, "little") * 2
+        data[place + 42 : place + 46] = large.header_offset.to_bytes(4, "little")
+        place = data.find(sign, place + 4)
+    file.write_bytes(data)
+    with pytest.raises(ModelError, match="is packed"):
+        check_unpacked(file)
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_what_torch_writes_is_read(tmp_path, old):
+    torch.save({"x": torch.arange(5)}, tmp_path / "a.pth", _use_new_zipfile_serialization=not old)
+    assert load_weights(tmp_path / "a.pth")["x"].tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_damaged_archive_is_one_sentence(tmp_path):
+    (tmp_path / "a.pth").write_bytes(b"PK\3\4" + bytes(50))
+    with pytest.raises(ModelError, match="damaged file of weights"):
+        load_weights(tmp_path / "a.pth")
