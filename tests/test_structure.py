@@ -50,3 +50,18 @@ def test_files_can_be_taken_in_at_a_sitting(python_files):
     }
     assert sum(lengths.values()) > 50_000
     assert {file: lines for file, lines in lengths.items() if lines > MOST_LINES} == {}
+
+
+def test_packed_files_are_unpacked_in_one_place(python_files):
+    """Elsewhere nobody would see to it that they unpack to no more than is taken."""
+    calls = ("torch.load(", "np.load(")
+    found = {
+        (file.as_posix().removeprefix("src/ico3d/"), call)
+        for file in python_files
+        for call in calls
+        if file.parts[0] == "src" and call in (ROOT / file).read_text("utf-8")
+    }
+    assert found == {
+        ("common/unpacking/weights.py", "torch.load("),
+        ("capture/reading/arrays.py", "np.load("),  # mapped, none is packed
+    }
