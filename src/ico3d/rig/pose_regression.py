@@ -34,11 +34,11 @@ class PoseRegression:
         self._mean = values.mean(0)  # (K,)
         self._range = values.min(0), values.max(0)  # (K,) each
         likeness = self._likeness(self._places) + RIDGE * np.eye(len(values))  # (P, P)
-        self._weights = np.linalg.solve(likeness, values - self._mean)  # (P, K)
+        self._weights: Array = np.linalg.solve(likeness, values - self._mean)  # (P, K)
 
     def at(self, rotations: Array) -> Array:
         """(K,) values of a pose, of which (J, 4) are the local rotations wxyz."""
-        found = self._mean + self._likeness(features(rotations)[None])[0] @ self._weights
+        found: Array = self._mean + self._likeness(features(rotations)[None])[0] @ self._weights
         return found.clip(*self._range)
 
     def _likeness(self, places: Array) -> Array:
