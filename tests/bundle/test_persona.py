@@ -5,7 +5,7 @@ import json
 import pytest
 
 from ico3d.bundle.manifest import Manifest
-from ico3d.bundle.persona import Persona, read_persona
+from ico3d.bundle.persona import Persona, check_persona, read_persona
 from ico3d.errors import BundleError
 
 FILE = """
@@ -75,6 +75,25 @@ def test_a_missing_or_huge_file_is_one_sentence(tmp_path):
     path.write_text("#" * (2 << 20))
     with pytest.raises(BundleError, match="larger than"):
         read_persona(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"forbidden": ("|".join(["ab"] * 330_000),)}, "forbidden must have at most 4000"),
+        ({"forbidden": ("|".join(["ab"] * 1300),)}, "forbidden must hold at most 1000 names"),
+        ({"forbidden": ("b" * 101,)}, "of at most 100 letters"),
+        ({"notes": ("ab |" * 240_000 + "=> c",)}, "notes must have at most 4000"),
+        ({"notes": ("\ufdfa" * 223,)}, "notes must have at most 4000"),  # 18 letters each
+        ({"notes": ("|".join(["ab"] * 1001) + "=> c",) * 10}, "notes must ask at most 10000"),
+        ({"notes": ("b" * 4000,) * 126}, "has 504004 letters; at most 500000"),
+        ({"voice": {"espeak-ng": "b" * 4001}}, "voice must have at most 4000"),
+    ],
+)
+def test_a_persona_has_as_much_text_as_people_write(given, message):
+    with pytest.raises(BundleError, match=message):
+        check_persona(Persona("Anna", **given), "anna")
+    check_persona(Persona("Anna", notes=("b" * 4000,) * 100, forbidden=("old war",) * 100), "anna")
 
 
 def test_bundles_hold_what_a_persona_says_and_old_ones_stay_readable(packed):

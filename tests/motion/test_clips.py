@@ -149,11 +149,23 @@ def test_what_is_no_file_of_gestures_is_refused(clips):
             from_bytes(content)
     with pytest.raises(SettingsError, match="do not ascend"):
         from_bytes(changed(clips, "wave/head/times", first, {"nod": late}))
+    with pytest.raises(SettingsError, match="damaged"):
+        from_bytes(changed(clips, "wave/head/times", first, {"nod": late | {"end": 10**400}}))
     about = json.loads(to_json(clips["nod"]))
     for key, value in (
+        ("marks", vars(clips["nod"].marks) | {"end": 10**400}),
         ("version", 2),
         ("curves", {"tail": about["curves"]["head"]}),
         ("marks", {}),
     ):
         with pytest.raises(SettingsError, match="the clip is damaged"):
             from_json(json.dumps(about | {key: value}))
+
+
+def test_a_file_of_more_gestures_than_anybody_makes_is_refused(clips):
+    first, marks = packed(clips["wave"].curves["head"])[0], vars(clips["nod"].marks)
+    with pytest.raises(SettingsError, match="holds 5002 gestures: at most 1000"):
+        many = {f"bow_{n}": marks for n in range(5000)}
+        from_bytes(changed(clips, "wave/head/times", first, many))
+    with pytest.raises(SettingsError, match="names of 100 letters"):
+        from_bytes(changed(clips, "wave/head/times", first, {"b" * 101: marks}))

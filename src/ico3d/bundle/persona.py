@@ -1,6 +1,8 @@
 """Who an avatar is: name, knowledge and manner, from a bundle or a file (docs/conversation.md)."""
 
 import re
+import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -11,6 +13,8 @@ from ico3d.errors import BundleError
 
 LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
 MOST_LETTERS = 4000  # of a text
+MOST_IN_ALL = 500_000  # letters of all texts, more than people write by hand
+MOST_NAMES, LONGEST_NAME = 1000, 100  # of forbidden topics, and letters of a name
 MOST_ENTRIES = 100  # of a list that is no list of notes
 
 
@@ -103,19 +107,49 @@ def check_persona(persona: Persona, where: str) -> None:
     Raises:
         BundleError: At the first invalid entry, which the sentence names.
     """
-    for entry in ("name", "greeting", "manner"):
-        short = len(getattr(persona, entry)) <= MOST_LETTERS
-        _require(short, where, entry, f"have at most {MOST_LETTERS} characters")
+    _check_lengths(persona, where)
     _require(len(persona.notes) <= MAX_NOTES, where, "notes", f"be at most {MAX_NOTES}")
+    questions = sum(note.partition("=>")[0].count("|") + 1 for note in persona.notes)
+    _require(questions <= MAX_NOTES, where, "notes", f"ask at most {MAX_NOTES} questions")
     for entry in ("languages", "voice", "forbidden"):
         few = len(getattr(persona, entry)) <= MOST_ENTRIES
         _require(few, where, entry, f"be at most {MOST_ENTRIES}")
     for code in persona.languages:
         known = LANGUAGE.fullmatch(code) is not None
         _require(known, where, "languages", f"be codes such as 'en' or 'pt-BR', not {code[:40]!r}")
-    for topic in persona.forbidden:
-        named = all(word.strip() for word in topic.split("|"))
-        _require(named, where, "forbidden", "hold topics such as 'politics | elections'")
+    names = [name.strip() for topic in persona.forbidden for name in topic.split("|")]
+    _require(all(names), where, "forbidden", "hold topics such as 'politics | elections'")
+    few = len(names) <= MOST_NAMES and max(map(_letters, names), default=0) <= LONGEST_NAME
+    what = f"hold at most {MOST_NAMES} names of at most {LONGEST_NAME} letters"
+    _require(few, where, "forbidden", what)
+
+
+def _check_lengths(persona: Persona, where: str) -> None:
+    """Checks what visitors' questions are compared with, or a language model is told."""
+    texts: dict[str, Iterable[str]] = {
+        "name": (persona.name,),
+        "greeting": (persona.greeting,),
+        "notes": persona.notes,
+        "manner": (persona.manner,),
+        "languages": persona.languages,
+        "voice": (*persona.voice, *persona.voice.values()),
+        "forbidden": persona.forbidden,
+    }
+    total = 0
+    for entry, given in texts.items():
+        each = "" if entry in ("name", "greeting", "manner") else " each"
+        for text in given:
+            letters = len(text) if len(text) > MOST_LETTERS else _letters(text)
+            short = letters <= MOST_LETTERS
+            _require(short, where, entry, f"have at most {MOST_LETTERS} characters{each}")
+            total += letters
+    if total > MOST_IN_ALL:
+        raise BundleError(f"{where}: persona has {total} letters; at most {MOST_IN_ALL} are read.")
+
+
+def _letters(text: str) -> int:
+    """How many letters a text has; one character may stand for eighteen."""
+    return len(unicodedata.normalize("NFKC", text))
 
 
 def _check_note(note: str, number: int, path: Path) -> None:

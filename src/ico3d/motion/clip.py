@@ -22,6 +22,10 @@ from ico3d.rig.quaternions import Array, continuous
 
 VERSION = 1
 """Version of the files."""
+MOST_CLIPS, LONGEST_NAME = 1000, 100
+"""Gestures of a file, and letters of a name: each question of a visitor is compared with all."""
+_DAMAGE = (ValueError, KeyError, TypeError, AttributeError, OverflowError)
+"""What parts of damaged files raise."""
 
 
 def meaning(name: str) -> str:
@@ -179,7 +183,7 @@ def from_bytes(content: bytes) -> dict[str, Clip]:
         arrays = load(content)
         about = parse_json(header["__metadata__"]["clips"].encode(), "clips", ValueError)
         return _clips(cast(dict[str, Any], about), arrays)
-    except (SafetensorError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (SafetensorError, *_DAMAGE) as error:
         raise SettingsError(f"the file of gestures is damaged ({error}).") from error
 
 
@@ -187,6 +191,9 @@ def _clips(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, Cl
     if about["version"] != VERSION:
         raise ValueError(f"its version is {about['version']}, not {VERSION}")
     curves: dict[str, dict[str, Curve]] = {name: {} for name in about["marks"]}
+    if len(curves) > MOST_CLIPS or max(map(len, curves), default=0) > LONGEST_NAME:
+        limits = f"at most {MOST_CLIPS}, with names of {LONGEST_NAME} letters"
+        raise ValueError(f"it holds {len(curves)} gestures: {limits}, are read")
     for key, rotations in arrays.items():
         name, role, what = key.split("/")
         if what == "rotations":
@@ -229,5 +236,5 @@ def from_json(text: str) -> Clip:
             curves[role] = unpacked(np.array(curve["times"], int), rotations)
         marks = Marks(**{k: float(v) for k, v in about["marks"].items()})
         return Clip(str(about["name"]), marks, _ordered(curves))
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except _DAMAGE as error:
         raise SettingsError(f"the clip is damaged ({error}).") from error

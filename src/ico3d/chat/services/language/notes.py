@@ -7,8 +7,12 @@ import unicodedata
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
 
 from ico3d.bundle.persona import Persona
+from ico3d.chat.services.language.index import Index
 from ico3d.motion.composing.lexicon import requested
 
 CONFIDENT = 0.42  # score from which a note is taken as the answer
@@ -69,11 +73,8 @@ class Notes:
             gestures: Meanings of the gestures that the body makes when it is asked to.
         """
         self._persona, self._gestures = persona, gestures
-        self.notes = [note for text in persona.notes if (note := parse_note(text))]
-        documents = [words(q) for note in self.notes for q in note.questions]
-        counts = Counter(word for document in documents for word in set(document))
-        self._rarity = {w: math.log(1 + len(documents) / n) for w, n in counts.items()}
-        self._unknown = UNKNOWN_WEIGHT * math.log(1 + len(documents))
+        self._asked, self._topics = _questions(persona.notes), _topics(persona.forbidden)
+        self.notes = self._asked.notes
 
     def answer(self, question: str) -> str:
         """The answer to a question in natural language."""
@@ -81,8 +82,8 @@ class Notes:
 
     def known(self, question: str) -> str | None:
         """The answer to a question if the notes, the body or politeness have one."""
-        question = question[:MOST_LETTERS]
-        if any(concerns(question, topic) for topic in self._persona.forbidden):
+        question = heard(question)
+        if self._topics.concern(question):
             return self.refusal()
         best, score = self.best(question)
         if best is not None and score >= CONFIDENT and not is_of_visitor(question, best):
@@ -98,14 +99,9 @@ class Notes:
 
     def nearest(self, question: str, count: int) -> list[tuple[Note, float]]:
         """The notes that match best, the best first, and their scores, 0 to 1."""
-        question = unicodedata.normalize("NFKC", question[:MOST_LETTERS])  # may be longer
-        question = question[:MOST_LETTERS]
-        said = self._weighted(words(question)), triples(question)
-        scored = [
-            (note, max(self._likeness(*said, asked) for asked in note.questions))
-            for note in self.notes
-        ]
-        return sorted(scored, key=lambda pair: -pair[1])[:count]
+        scores = self._asked.likeness(heard(question))
+        best = np.argsort(-scores, kind="stable")[:count]
+        return [(self.notes[at], float(scores[at])) for at in best]
 
     def fallback(self) -> str:
         """The answer if no note matches."""
@@ -133,14 +129,80 @@ class Notes:
             return f"Hello! I am {self._persona.name}. What would you like to know?"
         return None
 
-    def _likeness(self, said: dict[str, float], letters: dict[str, float], asked: str) -> float:
-        by_words = cosine(said, self._weighted(words(asked)))
-        by_letters = cosine(letters, triples(asked))
-        return WORDS * by_words + LETTERS * by_letters
+
+class Questions:
+    """What all notes ask, read once: a question costs what it shares with them."""
+
+    def __init__(self, texts: tuple[str, ...]):
+        """Parses the notes; those without `=>` are skipped."""
+        self.notes = [note for text in texts if (note := parse_note(text))]
+        asked = [question for note in self.notes for question in note.questions]
+        documents = [words(question) for question in asked]
+        counts = Counter(word for document in documents for word in set(document))
+        self._rarity = {w: math.log(1 + len(documents) / n) for w, n in counts.items()}
+        self._unknown = UNKNOWN_WEIGHT * math.log(1 + len(documents))
+        self._words = Index([self._weighted(document) for document in documents])
+        self._letters = Index([triples(question) for question in asked])
+        numbers = [len(note.questions) for note in self.notes]
+        self._firsts = np.cumsum([0, *numbers[:-1]])  # of each note's questions
+
+    def likeness(self, question: str) -> np.ndarray:
+        """(N,) how well each note fits a question, 0 to 1, by the nearest of its wordings."""
+        if not self.notes:
+            return np.zeros(0)
+        by_words = self._words.cosines(self._weighted(words(question)))
+        by_letters = self._letters.cosines(triples(question))
+        return np.maximum.reduceat(WORDS * by_words + LETTERS * by_letters, self._firsts)
 
     def _weighted(self, found: list[str]) -> dict[str, float]:
         weights = {word: self._rarity.get(word, self._unknown) for word in found}
         return {w: v * COMMON_WEIGHT if w in COMMON else v for w, v in weights.items()}
+
+
+class Topics:
+    """What the avatar declines to talk about, read once: a question costs its own length."""
+
+    def __init__(self, topics: tuple[str, ...]):
+        """Takes topics, each "word | other word"."""
+        names = (plain(name).split() for topic in topics for name in topic.split("|"))
+        self._names = list(dict.fromkeys(frozenset(name) for name in names if name))
+        roots = {word: stem(word) for name in self._names for word in name}
+        self._inside = {word for word, root in roots.items() if not root.isascii()}
+        self._roots = {
+            word: root
+            for word, root in roots.items()
+            if word not in self._inside and len(root) >= SHORTEST_ROOT
+        }
+        self._inner = {len(word) for word in self._inside}
+        self._leading = {len(root) for root in self._roots.values()}
+
+    def concern(self, question: str) -> bool:
+        """Whether a question contains all words of one of a topic's names, in any form.
+
+        `political` is a form of `politics`; scripts without spaces have a word inside another.
+        """
+        said = plain(question)
+        whole = set(said.split())
+        begun = {word[:length] for word in whole for length in self._leading}
+        within = {said[i : i + length] for length in self._inner for i in range(len(said))}
+        met = whole | (self._inside & within)
+        met |= {word for word, root in self._roots.items() if root in begun}
+        return any(name <= met for name in self._names)
+
+
+@lru_cache(maxsize=2)  # all sessions of a server ask the same notes
+def _questions(texts: tuple[str, ...]) -> Questions:
+    return Questions(texts)
+
+
+@lru_cache(maxsize=2)
+def _topics(topics: tuple[str, ...]) -> Topics:
+    return Topics(topics)
+
+
+def heard(question: str) -> str:
+    """As much of a question as is compared with notes; one letter may stand for eighteen."""
+    return unicodedata.normalize("NFKC", question[:MOST_LETTERS])[:MOST_LETTERS]
 
 
 def parse_note(text: str) -> Note | None:
@@ -150,26 +212,6 @@ def parse_note(text: str) -> Note | None:
     if not arrow or not questions or not answer.strip():
         return None
     return Note(questions, answer.strip())
-
-
-def concerns(question: str, topic: str) -> bool:
-    """Whether a question contains all words of one of a topic's names, in any form.
-
-    Args:
-        question: The visitor's words.
-        topic: "word | other word".
-    """
-    said = plain(question).split()
-    names = [plain(name).split() for name in topic.split("|")]
-    return any(name and all(any(_is_form(w, t) for w in said) for t in name) for name in names)
-
-
-def _is_form(word: str, topic: str) -> bool:
-    """`political` is a form of `politics`; scripts without spaces have it inside."""
-    root = stem(topic)
-    if not root.isascii():
-        return topic in word
-    return word.startswith(root) if len(root) >= SHORTEST_ROOT else word == topic
 
 
 def plain(text: str) -> str:
@@ -222,10 +264,3 @@ def triples(text: str) -> dict[str, float]:
     """Weights of a text's letter triples, many of which survive misheard words."""
     spaced = f" {plain(text)} "
     return dict(Counter(spaced[i : i + 3] for i in range(len(spaced) - 2)))
-
-
-def cosine(a: dict[str, float], b: dict[str, float]) -> float:
-    """Cosine of the angle between two sparse vectors."""
-    product = sum(value * b[key] for key, value in a.items() if key in b)
-    lengths = math.hypot(*a.values()) * math.hypot(*b.values()) if a and b else 0.0
-    return product / lengths if lengths else 0.0
