@@ -41,6 +41,10 @@ def test_it_is_read_as_written():
         ({"actions": [{"frame": 41, "score": 1}]}, "actions[0].frame must lie between 0 and 40."),
         ({"actions": [{"frame": 4, "score": 2}]}, "actions[0].score must lie between 0 and 1."),
         ({"actions": 2 * [{"frame": 4, "score": 1}]}, "actions[1].frame must be there only once."),
+        (
+            {"actions": [{"frame": 0, "score": 0}] * 1001},
+            "actions must be at most 1000.",
+        ),
         ({"actions": {}}, "animation.json.actions must be a list, not an object."),
         ({"min_speed": 0}, "min_speed must lie between 0 and 4."),
         ({"max_speed": 0.5}, "max_speed must lie between min_speed and 4."),

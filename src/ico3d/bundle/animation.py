@@ -18,6 +18,7 @@ ANIMATION = "animation.json"
 VERSION = 1
 MAX_BYTES = 1 << 20
 MAX_FRAMES = 1_000_000
+MAX_ACTIONS = 1000
 FASTEST = 4.0
 """Highest value of `max_speed`, captured seconds per second."""
 
@@ -89,11 +90,13 @@ class Animation:
         _require(0 <= self.rest.start < last, "rest.start", f"lie between 0 and {last - 1}")
         inside = self.rest.start < self.rest.end <= last
         _require(inside, "rest.end", f"lie between {self.rest.start + 1} and {last}")
-        frames = [action.frame for action in self.actions]
+        _require(len(self.actions) <= MAX_ACTIONS, "actions", f"be at most {MAX_ACTIONS}")
+        seen: set[int] = set()
         for index, action in enumerate(self.actions):
             where = f"actions[{index}]"
             _require(0 <= action.frame <= last, f"{where}.frame", f"lie between 0 and {last}")
-            _require(action.frame not in frames[:index], f"{where}.frame", "be there only once")
+            _require(action.frame not in seen, f"{where}.frame", "be there only once")
+            seen.add(action.frame)
             _require(0 <= action.score <= 1, f"{where}.score", "lie between 0 and 1")
         _require(0 < self.min_speed <= FASTEST, "min_speed", f"lie between 0 and {FASTEST:g}")
         inside = self.min_speed <= self.max_speed <= FASTEST
