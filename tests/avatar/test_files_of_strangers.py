@@ -1,20 +1,32 @@
 """Files of folders by anybody that are links to devices, or pipes: one sentence, at once."""
 
 import os
+from types import SimpleNamespace
 
 import pytest
 
+from ico3d.avatar.animation.keyframes import read_animation
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.camera_path import read_key_cameras
+from ico3d.avatar.recorded import read_cuts
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.format import read_background
 from ico3d.capture.multiview.description import read_json
 from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.synthetic import SyntheticCapture
+from ico3d.common.files import MOST_NOTES
 from ico3d.errors import Ico3dError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.scene.model_folder import TrainedScene
 from ico3d.splat.files.formats import read_file
+
+BODY = SimpleNamespace(windows=[SimpleNamespace(last=6)], fps=15.0)
+
+
+def sparse(file):
+    with file.open("wb") as opened:
+        opened.truncate(MOST_NOTES + 1)
+
 
 READERS = {
     "cameras.json": lambda folder: read_json(folder / "cameras.json"),
@@ -39,3 +51,12 @@ def test_what_has_no_end_is_not_read(tmp_path, name, pipe):
         (tmp_path / name).symlink_to("/dev/zero")
     with pytest.raises(Ico3dError):
         READERS[name](tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "read"), [("clips.toml", read_cuts), ("animation.json", read_animation)]
+)
+def test_larger_files_than_anybody_writes_are_not_read(tmp_path, name, read):
+    sparse(tmp_path / name)
+    with pytest.raises(Ico3dError, match="no small file"):
+        read(tmp_path, BODY)

@@ -143,6 +143,7 @@ def test_backgrounds_that_are_read(name, data):
         ("background.ply", ply(2, b"\0" * 33), "its header promises"),
         ("background.ply", ply(0), "must hold 1 to"),
         ("background.ply", ply(10**18, b""), "must hold 1 to"),
+        ("background.ply", ply("9" * 5000, b""), "declares what no file"),
         ("background.ply", ply(kind="list uchar int"), "declares what no file"),
         ("background.ply", ply(more="element vertex 2\n"), "declares what no file"),
         ("background.ply", ply(kind="complex"), "declares what no file"),

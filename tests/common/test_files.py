@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from ico3d.common import files
-from ico3d.common.files import read_small, remove_unfinished, walk, write_atomic
+from ico3d.common.files import (
+    json_of,
+    read_object,
+    read_small,
+    remove_unfinished,
+    walk,
+    write_atomic,
+)
 
 
 def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -72,3 +79,16 @@ def test_folders_are_walked_as_by_the_system_and_links_are_not(tmp_path):
         (place, sorted(inside), sorted(names)) for place, inside, names in os.walk(tmp_path)
     ]
     assert sorted(found) == sorted(expected)
+
+
+@pytest.mark.parametrize(
+    "content", [b"[" * 200_000, b'{"a": ' * 200_000, b"\xff\xfe", b"", b"1" * 5000]
+)
+def test_what_is_no_json_is_told_as_such(tmp_path, content):
+    file = tmp_path / "a.json"
+    file.write_bytes(content)
+    with pytest.raises(ValueError):
+        json_of(file)
+    assert read_object(file) == {}
+    file.write_bytes(b'\xef\xbb\xbf{"a": [1, NaN]}')  # as some editors begin a file
+    assert json_of(file)["a"][0] == 1

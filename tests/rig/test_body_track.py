@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from safetensors import safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import load_file, save_file
 
 from ico3d.errors import CaptureError
 from ico3d.rig.binding import Binding
@@ -104,12 +104,21 @@ def test_impossible_values_are_refused(track, tmp_path, name, value, why):
 
 
 @pytest.mark.parametrize(
-    "about", [{"parents": [0, 0]}, {"names": ["a", "a"]}, {"version": 2}, {"fps": "fast"}]
+    "about",
+    [{"parents": [0, 0]}, {"names": ["a", "a"]}, {"version": 2}, {"fps": "fast"}, {"fps": 10**400}],
 )
 def test_wrong_rigs_are_refused(track, tmp_path, about):
     damaged(track, tmp_path, **about)
     with pytest.raises(CaptureError, match="is damaged"):
         read_body_track(tmp_path, 5, 15.0)
+
+
+def test_a_description_that_is_none_is_refused(track, tmp_path):
+    file = write_body_track(track, tmp_path)
+    for about in ("[]", "5", "[" * 100_000, '{"version": 1, "names": ["a"], "parents": [1e400]}'):
+        save_file(load_file(file), file, {"body_track": about})
+        with pytest.raises(CaptureError, match="is damaged"):
+            read_body_track(tmp_path, 5, 15.0)
 
 
 def test_what_is_no_such_file_is_refused(tmp_path):

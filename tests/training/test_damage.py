@@ -116,7 +116,7 @@ def test_checkpoints_of_earlier_versions_are_taken(died):
 
 
 @pytest.mark.parametrize("name", ["settings.json", "finished.json"])
-@pytest.mark.parametrize("content", [b"", b'{"a', b"[]", b"\xff\x00"])
+@pytest.mark.parametrize("content", [b"", b'{"a', b"[]", b"\xff\x00", b"[" * 200_000])
 def test_other_damaged_files_of_a_run_are_one_sentence(died, name, content):
     (died / name).write_bytes(content)
     with pytest.raises(ModelError, match=rf"{name} is damaged: put a copy of it there"):
@@ -126,7 +126,9 @@ def test_other_damaged_files_of_a_run_are_one_sentence(died, name, content):
 
 def test_damaged_metrics_stop_no_training(died):
     text = (died / "metrics.jsonl").read_bytes().splitlines(keepends=True)
-    (died / "metrics.jsonl").write_bytes(text[0] + b"\0\0\xff\n[]\n" + text[1])
+    (died / "metrics.jsonl").write_bytes(
+        text[0] + b"\0\0\xff\n[]\n" + b"[" * 200_000 + b"\n" + text[1]
+    )
     run_loop(Walk(), RunFolder(died, {}), SETTINGS)
     steps = [json.loads(line)["step"] for line in (died / "metrics.jsonl").read_text().splitlines()]
     assert steps == [0, 5, 15, 19]

@@ -1,10 +1,13 @@
 """What is written about how a model was made."""
 
+import json
 import subprocess
 
+import pytest
 import torch
 
 from ico3d import __version__
+from ico3d.errors import ModelError
 from ico3d.training import provenance
 from ico3d.training.provenance import ENVIRONMENTS, environment, environments, note_environment
 
@@ -43,3 +46,16 @@ def test_a_run_that_goes_on_elsewhere_says_so(tmp_path, monkeypatch):
     found = environments([tmp_path, other, tmp_path / "never begun"])
     assert [one["torch"] for one in found][1:] == ["99"] and len(found) == 2
     assert (tmp_path / ENVIRONMENTS).is_file()
+
+
+@pytest.mark.parametrize("content", ["[" * 200_000, "{}", "[5]", "\0"])
+def test_a_damaged_list_of_environments_is_one_sentence(tmp_path, content):
+    (tmp_path / ENVIRONMENTS).write_text(content)
+    with pytest.raises(ModelError, match=r"is damaged.*: remove it\."):
+        environments([tmp_path])
+
+
+def test_many_environments_take_time_by_their_number(tmp_path):
+    many = [{"run": number} for number in range(50_000)]
+    (tmp_path / ENVIRONMENTS).write_text(json.dumps([*many, many[0]]))
+    assert environments([tmp_path, tmp_path]) == many  # by its square: half a minute

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ico3d.avatar.head_joint import hung
 from ico3d.body.model_folder import TrainedBody
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
@@ -178,7 +178,7 @@ class TrainedAvatar:
         """
         folder = Path(folder)
         try:
-            summary = json.loads(read_small(folder / ABOUT))["summary"]
+            summary = json_of(folder / ABOUT)["summary"]
         except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no avatar ({error}): make one with ico3d assemble."

@@ -1,6 +1,5 @@
 """Camera paths of films: an orbit around the person, or a path through key cameras."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +8,11 @@ import numpy as np
 
 from ico3d.avatar.render_bundle import visitor_camera
 from ico3d.body.training.novel_views import se3_exp, se3_log
+from ico3d.bundle.limits import MAX_CAMERA_LENGTH
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
-from ico3d.common.files import read_small
+from ico3d.common.files import json_of
 from ico3d.errors import CaptureError, SettingsError
 
 AIR = 1.15
@@ -26,6 +26,8 @@ ELEVATION = np.radians(8)
 """Elevation of the camera above the person's middle, radians, where no capture gives an orbit."""
 OPPOSITE = np.radians(179)
 """Largest rotation between successive key cameras, radians: at π the shortest way is ambiguous."""
+MOST_KEYS = 1000
+"""Key cameras of a path."""
 FIELD_OF_VIEW = 40.0
 """Vertical field of view of key cameras that name none, degrees."""
 
@@ -136,9 +138,11 @@ def read_key_cameras(file: Path, width: int, height: int) -> list[Camera]:
         SettingsError: If the file cannot be read, or a camera in it makes no sense.
     """
     try:
-        entries = json.loads(read_small(file))["cameras"]
+        entries = json_of(file)["cameras"]
+        if len(entries) > MOST_KEYS:
+            raise ValueError(f"it has {len(entries)} cameras, at most {MOST_KEYS} are read")
         cameras = [_key_camera(entry, width, height) for entry in entries]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, OverflowError) as error:
         raise SettingsError(
             f'{file} is no camera path ({error}): it should look like {{"cameras": '
             '[{"eye": [0, 1, 3], "target": [0, 1, 0]}, …]}.'
@@ -162,8 +166,10 @@ def _key_camera(entry: dict, width: int, height: int) -> Camera:
     places = [np.array(entry[name], np.float64) for name in ("eye", "target")]
     places.append(np.array(entry.get("up", (0.0, 1.0, 0.0)), np.float64))
     fov = float(entry.get("fov_y", FIELD_OF_VIEW))
-    if any(place.shape != (3,) or not np.isfinite(place).all() for place in places):
-        raise ValueError("eye, target and up have three numbers each")
+    # Written so that NaN, too, is not within.
+    if not all(p.shape == (3,) and (abs(p) <= MAX_CAMERA_LENGTH).all() for p in places):
+        most = f"of at most {MAX_CAMERA_LENGTH:g} m"
+        raise ValueError(f"eye, target and up have three numbers each, {most}")
     if not 1 <= fov <= 170:
         raise ValueError("fov_y lies between 1 and 170 degrees")
     eye, target, up = places

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ico3d.avatar.head_joint import rig_of, trained_poses
 from ico3d.body.model_folder import TrainedBody
+from ico3d.common.files import read_small
 from ico3d.errors import SettingsError
 from ico3d.motion.recorded.cut import CUTS, Cut, from_toml
 from ico3d.motion.recorded.recording import Recording, recording_of
@@ -29,4 +30,8 @@ def read_cuts(folder: Path, body: TrainedBody) -> tuple[Cut, ...] | None:
     file = folder / CUTS
     if not file.is_file():
         return None
-    return from_toml(file.read_bytes(), str(file), body.fps, body.windows[-1].last + 1)
+    try:
+        content = read_small(file)
+    except OSError as error:
+        raise SettingsError(f"{file} cannot be read ({error}).") from error
+    return from_toml(content, str(file), body.fps, body.windows[-1].last + 1)

@@ -11,7 +11,7 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.opening import motion_from
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import Method
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
@@ -143,7 +143,7 @@ class TrainedBody:
         """
         folder = Path(folder)
         try:
-            content = json.loads(read_small(folder / about))
+            content = json_of(folder / about)
             entries = content["windows"]
             windows = tuple(Window(int(e["first"]), int(e["last"])) for e in entries)
             files = [folder / str(entry["file"]) for entry in entries]

@@ -14,6 +14,7 @@ from ico3d.errors import BundleError, GaussianFileError
 BACKGROUNDS = ("background.spz", "background.ply")
 """Possible names of the background; a bundle holds at most one of them."""
 _MAX_PLY_HEADER = 1 << 16
+_COUNT = re.compile("[0-9]{1,30}")
 _WIDTHS = {
     **dict.fromkeys(("char", "int8", "uchar", "uint8"), 1),
     **dict.fromkeys(("short", "int16", "ushort", "uint16"), 2),
@@ -63,7 +64,7 @@ def _ply_tables(lines: list[list[str]], name: str) -> tuple[dict[str, int], dict
     widths: dict[str, int] = {}
     for words in lines:
         match words:
-            case ["element", table, rows] if rows.isdecimal() and table not in counts:
+            case ["element", table, rows] if _COUNT.fullmatch(rows) and table not in counts:
                 counts[table], widths[table] = int(rows), 0
             case ["property", kind, _] if counts and kind in _WIDTHS:
                 widths[list(counts)[-1]] += _WIDTHS[kind]

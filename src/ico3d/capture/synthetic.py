@@ -1,6 +1,5 @@
 """Reads a synthetic capture (docs/captures/synthetic.md, "Synthetic captures")."""
 
-import json
 import wave
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from ico3d.capture.decoding import DAMAGED, open_picture, unit
 from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
-from ico3d.common.files import MOST_BYTES, read_small
+from ico3d.common.files import MOST_BYTES, json_of, read_small
 from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
@@ -194,8 +193,8 @@ def _check_array(
 
 def _read_json(file: Path) -> dict:
     try:
-        about = json.loads(read_small(file).decode("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        about = json_of(file)
+    except (OSError, ValueError) as error:
         raise CaptureError(f"{file} is missing or damaged: record again.") from error
     if not isinstance(about, dict) or about.get("format") != FORMAT:
         raise CaptureError(f"{file} does not describe a synthetic capture ('{FORMAT}').")

@@ -1,7 +1,6 @@
 """Writes files so that a crash never leaves half of one; finds and reads small ones of anybody."""
 
 import errno
-import json
 import os
 import re
 import secrets
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
+from ico3d.common.typed import loose_json
 from ico3d.errors import StorageError
 
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
@@ -92,10 +92,20 @@ def remove_unfinished(folder: Path) -> None:
 def read_object(file: Path) -> dict[str, Any]:
     """The object in a file of JSON, which may be anybody's; empty where there is none."""
     try:
-        content: object = json.loads(read_small(file).decode("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        content = json_of(file)
+    except (OSError, ValueError):
         return {}
     return cast(dict[str, Any], content) if isinstance(content, dict) else {}
+
+
+def json_of(file: Path, links: bool = True) -> Any:
+    """What a file of JSON holds, which may be anybody's; `links` as for `read_small`.
+
+    Raises:
+        OSError: If it is not there, no regular file, or too large.
+        ValueError: If it is no JSON in UTF-8, or nested too deep.
+    """
+    return loose_json(read_small(file, links))
 
 
 def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes:

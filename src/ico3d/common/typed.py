@@ -308,6 +308,19 @@ def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any
         raise error(f"{name}: is not valid JSON ({line}).") from cause
 
 
+def loose_json(data: bytes | str) -> Any:
+    """Parses JSON that may be anybody's, as leniently as Python: NaN may be there, keys repeat.
+
+    Raises:
+        ValueError: If it is no JSON in UTF-8, or nested too deep.
+    """
+    text = data if isinstance(data, str) else data.decode("utf-8-sig")
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("it is nested too deep") from error
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """Parses TOML that may be anybody's.
 

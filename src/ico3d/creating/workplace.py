@@ -12,7 +12,7 @@ from pathlib import Path
 from ico3d.avatar.embodying.look import UNCHANGED
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.voice import VOICE as TONE
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import read_object, write_atomic
 from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import plain
 from ico3d.creating.looking.advice import Advice
@@ -84,10 +84,7 @@ class Workplace:
 
     def read(self, name: str) -> dict | None:
         """A note that `write` left, or None."""
-        try:
-            return json.loads(read_small(self.file(name)).decode("utf-8"))
-        except (OSError, ValueError):
-            return None
+        return read_object(self.file(name)) or None
 
     def write(self, name: str, values: dict) -> None:
         """Leaves a note."""

@@ -10,7 +10,7 @@ import torch
 
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE, TURN_SIZE, EyeRange
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import (
     BlendshapeTrack,
@@ -153,7 +153,7 @@ class TrainedHead:
         """
         folder = Path(folder)
         try:
-            about = json.loads(read_small(folder / ABOUT))
+            about = json_of(folder / ABOUT)
             inputs, names = about["inputs"], tuple(about["blendshape_names"])
             encoder = about["encoder"], about["encoder_sha256"]
             summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))

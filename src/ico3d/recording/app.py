@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import json
 import time
 from collections import defaultdict
 from collections.abc import AsyncIterator
@@ -18,7 +17,7 @@ from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.server import add_page
 from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.common.files import FULL
-from ico3d.common.typed import plain
+from ico3d.common.typed import loose_json, plain
 from ico3d.creating.settings import QUALITIES
 from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError
@@ -338,8 +337,8 @@ async def _form(request: Request) -> dict[str, Any]:
         Refused: If it is large.
     """
     try:
-        form = json.loads(await _body(request, LARGEST_FORM))
-    except (ValueError, RecursionError):
+        form = loose_json(await _body(request, LARGEST_FORM))
+    except ValueError:
         return {}
     return form if isinstance(form, dict) else {}
 

@@ -150,7 +150,7 @@ def read_body_track(recording: Path, num_frames: int, fps: float) -> BodyTrack |
         return None
     try:
         track = _read(file)
-    except (OSError, SafetensorError, ValueError, KeyError, TypeError) as error:
+    except (OSError, SafetensorError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise CaptureError(
             f"{file} is damaged ({error}): delete it and run ico3d capture pose again."
         ) from error
@@ -166,13 +166,16 @@ def _read(file: Path) -> BodyTrack:
     """Reads a file of a body track.
 
     Raises:
-        OSError, SafetensorError, ValueError, KeyError or TypeError: If the file is damaged.
+        OSError, SafetensorError, ValueError, KeyError, TypeError, OverflowError: If it is damaged.
     """
     with cast(Any, safe_open(file, "numpy")) as content:  # untyped
         text = cast(dict[str, str], content.metadata() or {}).get("body_track", "{}")
         names = cast(list[str], content.keys())
         arrays: dict[str, np.ndarray] = {name: content.get_tensor(name) for name in names}
-    about = cast(dict[str, Any], parse_json(text.encode(), file.name, ValueError))
+    described: object = parse_json(text.encode(), file.name, ValueError)
+    if not isinstance(described, dict):
+        raise TypeError("its description is no object")
+    about = cast(dict[str, Any], described)
     if about.get("version") != VERSION:
         raise ValueError(f"its version is {about.get('version')}, not {VERSION}")
     rig = Rig(tuple(map(str, about["names"])), tuple(map(int, about["parents"])), arrays["joints"])

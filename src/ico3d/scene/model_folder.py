@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
 from ico3d.scene.model import StaticScene
 from ico3d.scene.views import Frames, Only, Space
@@ -59,7 +59,7 @@ class TrainedScene:
         """
         folder = Path(folder)
         try:
-            about = json.loads(read_small(folder / ABOUT))
+            about = json_of(folder / ABOUT)
             fields = {name: about[name] for name in ("only", "frames", "space", "summary")}
         except DAMAGED as error:
             raise ModelError(

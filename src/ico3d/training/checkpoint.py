@@ -13,6 +13,7 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 
 from ico3d.common.files import write_atomic
+from ico3d.common.typed import loose_json
 from ico3d.errors import ModelError
 
 DTYPES = {
@@ -122,7 +123,7 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
         ModelError: If the file is missing, damaged, or no checkpoint.
     """
     with _opened(path) as file:
-        state = json.loads((file.metadata() or {})["state"])
+        state = loose_json((file.metadata() or {})["state"])
         return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
 
 
@@ -170,7 +171,7 @@ def placed(tensors: dict[str, Tensor], place: Callable[[str], torch.device]) -> 
 def load_state(path: Path) -> dict:
     """Reads only the state of a checkpoint, not its tensors; errors as for `load_tensors`."""
     with _opened(path) as file:
-        return json.loads((file.metadata() or {})["state"])
+        return loose_json((file.metadata() or {})["state"])
 
 
 def check_shapes(build: Callable[[], nn.Module], tensors: Mapping[str, Tensor]) -> None:

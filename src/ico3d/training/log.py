@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ico3d.common.files import write_atomic
+from ico3d.common.typed import loose_json
 
 METRICS = "metrics.jsonl"
 TAIL = 4096
@@ -58,7 +59,7 @@ def _entries_before(path: Path, step: int) -> list[str]:
 
 def _is_before(line: str, step: int) -> bool:
     try:
-        return json.loads(line)["step"] < step
+        return loose_json(line)["step"] < step
     except (ValueError, LookupError, TypeError):
         return False
 
@@ -74,8 +75,8 @@ def latest_entry(folder: Path) -> dict | None:
     except FileNotFoundError:
         return None
     try:
-        entry = json.loads(whole.rpartition(b"\n")[2]) if whole else None
-    except (ValueError, RecursionError):  # damaged by the disk
+        entry = loose_json(whole.rpartition(b"\n")[2]) if whole else None
+    except ValueError:  # damaged by the disk
         return None
     return entry if isinstance(entry, dict) and is_step(entry.get("step")) else None
 

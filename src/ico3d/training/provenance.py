@@ -10,7 +10,8 @@ from pathlib import Path
 import torch
 
 import ico3d
-from ico3d.common.files import write_atomic
+from ico3d.common.files import json_of, write_atomic
+from ico3d.errors import ModelError
 from ico3d.splat.device import device_name
 
 ENVIRONMENTS = "environments.json"
@@ -41,11 +42,21 @@ def note_environment(folder: Path, device: torch.device) -> None:
 
 def environments(folders: Iterable[Path]) -> list[dict]:
     """The environments of some runs, each once, in the order of the folders."""
-    found: list[dict] = []
+    found: dict[str, dict] = {}
     for file in (folder / ENVIRONMENTS for folder in folders):
         if file.is_file():
-            found += [one for one in json.loads(file.read_text()) if one not in found]
-    return found
+            found |= {json.dumps(one, sort_keys=True): one for one in _listed(file)}
+    return list(found.values())
+
+
+def _listed(file: Path) -> list[dict]:
+    try:
+        listed = json_of(file)
+    except (OSError, ValueError) as error:
+        raise ModelError(f"{file} is damaged ({error}): remove it.") from error
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise ModelError(f"{file} is damaged: remove it.")
+    return listed
 
 
 def provenance(folders: Iterable[Path], seed: int, used: Mapping[str, object]) -> dict:

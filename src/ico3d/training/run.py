@@ -7,7 +7,7 @@ from pathlib import Path
 
 from torch import Tensor
 
-from ico3d.common.files import read_small, remove_unfinished, write_atomic
+from ico3d.common.files import json_of, remove_unfinished, write_atomic
 from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import check_seal, load_sealed, load_state, save_sealed
 from ico3d.training.log import is_step
@@ -193,7 +193,7 @@ def _read(file: Path) -> dict:
         ModelError: If it is damaged.
     """
     try:
-        found = json.loads(read_small(file).decode("utf-8"))
+        found = json_of(file)
     except (OSError, ValueError) as error:
         raise ModelError(_damaged(file)) from error
     if not isinstance(found, dict):

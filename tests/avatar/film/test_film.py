@@ -117,11 +117,23 @@ def test_key_cameras_are_met_and_joined_by_screws(tmp_path):
         [{"eye": [0, 1, 3], "target": [0, 0, 0], "fov": 20}],
         [{"eye": [0, 1, "x"], "target": [0, 0, 0]}],
         [7],
+        [{"eye": [0, 1, 10**400], "target": [0, 0, 0]}],
+        [{"eye": [0, 1, 1e300], "target": [0, 0, 0]}],
+        [{"eye": [0, 1, 3], "target": [0, 0, 0], "fov_y": 10**400}],
+        [{"eye": [0, 1, 3], "target": [0, 0, 0]}] * 1001,
     ],
 )
 def test_files_that_are_no_path_are_refused(tmp_path, entries):
     with pytest.raises(SettingsError, match=r"path\.json"):
         read_key_cameras(_file(tmp_path, *entries), WIDTH, HEIGHT)
+
+
+def test_brackets_without_an_end_are_no_path(tmp_path):
+    (tmp_path / "path.json").write_text("[" * 200_000)
+    with pytest.raises(
+        SettingsError, match=r"path\.json is no camera path \(it is nested too deep"
+    ):
+        read_key_cameras(tmp_path / "path.json", WIDTH, HEIGHT)
 
 
 def test_opposite_keys_have_no_way_between(tmp_path):

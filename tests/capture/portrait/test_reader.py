@@ -276,3 +276,36 @@ def test_a_focal_length_that_is_no_number_in_pixels_is_told(folder, focal):
     file = folder / "transforms_train.json"
     file.write_text(json.dumps(json.loads(file.read_text()) | {"focal_len": focal}))
     _fails(folder, "transforms_train.json", "must be numbers in pixels")
+
+
+@pytest.mark.parametrize("number", [10**400, -1, 10**7, True])
+def test_a_number_that_no_picture_has_is_told(folder, number):
+    file = folder / "transforms_val.json"
+    content = json.loads(file.read_text())
+    content["frames"][0] |= {"img_id": number, "aud_id": number}
+    file.write_text(json.dumps(content))
+    _fails(folder, "transforms_val.json", "needs a whole img_id")
+
+
+def test_pictures_that_are_named_otherwise_count_nothing(folder):
+    before = open_capture(folder).num_frames
+    for name in ("\u00b2", "\u0663\u0663", "9" * 50):
+        (folder / "ori_imgs" / f"{name}.jpg").touch()
+    assert open_capture(folder).num_frames == before
+
+
+@pytest.mark.parametrize(
+    ("stated", "what"),
+    [
+        ({"likeness": 5}, "provenance.likeness must be a text"),
+        ({"consent": None}, "provenance.consent must be a text"),
+        ({"kind": []}, "provenance.kind must be a text"),
+        ({"sources": 5}, "provenance.sources must be a list"),
+        ({"sources": [5]}, "provenance.sources must be a list"),
+        ([], "provenance must be an object"),
+        (5, "provenance must be an object"),
+    ],
+)
+def test_what_states_nothing_of_a_person_is_told(folder, stated, what):
+    (folder / "ico3d.json").write_text(json.dumps({"provenance": stated}))
+    _fails(folder, "ico3d.json", what)

@@ -1,6 +1,7 @@
 """Finds where a body rests and at which frames its motion may turn around.
 
 The paper picks these key frames by hand (section "Procedural Body Animation"). Here they follow
+from ico3d.common.files import read_small
 from the speed of the hands, which move most: a body rests where its hands are slow for long, and
 its motion can turn around or be held where they slow down away from rest.
 """
@@ -16,6 +17,7 @@ from scipy.spatial import KDTree
 
 from ico3d.avatar.moving import MovingBody, check_moves
 from ico3d.bundle.animation import ANIMATION, Action, Animation, Rest
+from ico3d.common.files import read_small
 from ico3d.errors import BundleError
 
 SEEN = 0.1
@@ -116,8 +118,8 @@ def read_animation(folder: Path, body: MovingBody) -> Animation | None:
     if not file.is_file():
         return None
     try:
-        animation = Animation.from_bytes(file.read_bytes())
-    except BundleError as error:
+        animation = Animation.from_bytes(read_small(file))
+    except (OSError, BundleError) as error:
         raise BundleError(f"{folder}: {error}") from error
     if (animation.fps, animation.num_frames) != (body.fps, frames):
         raise BundleError(

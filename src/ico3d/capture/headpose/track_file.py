@@ -11,7 +11,7 @@ from safetensors.numpy import load, save
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding
 from ico3d.common.expression import EYE_NAMES
-from ico3d.common.files import write_atomic
+from ico3d.common.files import MOST_BYTES, read_small, write_atomic
 from ico3d.errors import CaptureError
 
 NAME = "tracking.safetensors"
@@ -118,7 +118,7 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
         return None
     mend = "delete it and run ico3d capture track again"
     try:
-        arrays = load(file.read_bytes())
+        arrays = load(read_small(file, most=MOST_BYTES))
     except (OSError, SafetensorError, ValueError, KeyError) as error:
         raise CaptureError(f"{file} is damaged: {mend}.") from error
     shapes = {

@@ -12,7 +12,7 @@ import numpy as np
 
 from ico3d.capture.lens import Lens
 from ico3d.capture.poses import rigid
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import json_of, write_atomic
 from ico3d.common.people.stated import NOT_STATED
 from ico3d.errors import CaptureError
 
@@ -121,11 +121,11 @@ def read_json(file: Path) -> dict:
         CaptureError: If the file is missing or damaged.
     """
     try:
-        content = json.loads(read_small(file).decode("utf-8"))
+        content = json_of(file)
     except FileNotFoundError as error:
         raise CaptureError(f"{file} is missing.") from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise CaptureError(f"{file} is damaged: it is no JSON.") from error
+    except (OSError, ValueError) as error:
+        raise CaptureError(f"{file} is damaged: it is no JSON ({error}).") from error
     if not isinstance(content, dict):
         raise CaptureError(f"{file} must hold a JSON object.")
     return content

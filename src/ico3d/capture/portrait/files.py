@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from ico3d.capture.decoding import open_picture
+from ico3d.errors import CaptureError
 
 DETAILS = "ico3d.json"
 """File for data that have no place in the talking-portrait layout."""
@@ -89,3 +90,25 @@ def load_uint8(path: Path) -> np.ndarray:
     """A picture as uint8."""
     with open_picture(path, str(path)) as picture:
         return np.asarray(picture)
+
+
+def stated_in(details: dict, where: str) -> dict:
+    """The provenance that `ico3d.json` states, as far as it does.
+
+    Args:
+        details: Its content.
+        where: Its path, for errors.
+
+    Raises:
+        CaptureError: If something that it states is no text, or the sources are no list of texts.
+    """
+    stated = details.get("provenance", {})
+    if not isinstance(stated, dict):
+        raise CaptureError(f"{where}: provenance must be an object.")
+    for name in ("kind", "likeness", "consent", "licence"):
+        if not isinstance(stated.get(name, ""), str):
+            raise CaptureError(f"{where}: provenance.{name} must be a text.")
+    sources = stated.get("sources", [])
+    if not isinstance(sources, list) or not all(isinstance(name, str) for name in sources):
+        raise CaptureError(f"{where}: provenance.sources must be a list of texts.")
+    return stated

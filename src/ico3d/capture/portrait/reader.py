@@ -1,5 +1,6 @@
 """Reads the talking-portrait layout, written by ico3d or by other programs."""
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from functools import cached_property
@@ -13,7 +14,7 @@ from ico3d.capture.capture import EYE_NAMES, RecordedCapture, Sound, Split
 from ico3d.capture.decoding import DAMAGED, open_picture, to_bytes, unit
 from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
 from ico3d.capture.multiview.description import MOST_FRAMES, number, read_json
-from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
+from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks, stated_in
 from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
 from ico3d.capture.reading.arrays import read_numbers
 from ico3d.capture.sound import read_sound_file
@@ -22,6 +23,7 @@ from ico3d.capture.vetting.claims import check_claimed
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
+_NUMBER = re.compile("[0-9]{1,9}")
 FPS = 25.0
 Result = TypeVar("Result")
 
@@ -58,6 +60,7 @@ class TalkingPortrait(RecordedCapture):
         known = max(listed, max(pictures, default=-1) + 1)
         counted = {"fps": FPS, "num_frames": known} | self._details
         where = str(path / DETAILS)
+        self._stated = stated_in(self._details, where)
         self.fps = number(counted, "fps", where, 1e-3, 1e3)
         self.num_frames = int(number(counted, "num_frames", where, listed, MOST_FRAMES))
         check_claimed(self.num_frames, [max(len(pictures), len(self._poses))], str(path))
@@ -163,8 +166,7 @@ class TalkingPortrait(RecordedCapture):
     def provenance(self) -> dict:
         """Likeness, consent, licence and sources, as far as the folder states them."""
         unknown = super().provenance | {"sources": [self.path.name]}
-        stated = self._details.get("provenance")
-        return unknown | (stated if isinstance(stated, dict) else {})
+        return unknown | self._stated
 
     @property
     def details(self) -> dict:
@@ -321,9 +323,10 @@ def _ids(path: Path, name: str, transforms: dict) -> tuple[int, ...]:
     if not isinstance(frames, list) or (name == "train" and not frames):
         raise CaptureError(f"{file} lists no frames.")
     given = [frame.get("img_id") if isinstance(frame, dict) else None for frame in frames]
-    ids = [i for i in given if isinstance(i, int) and i >= 0]
+    ids = [i for i in given if type(i) is int and 0 <= i < MOST_FRAMES]  # no True
     if len(ids) < len(given):
-        raise CaptureError(f"{file}: every frame needs a whole img_id of 0 or more.")
+        most = MOST_FRAMES - 1
+        raise CaptureError(f"{file}: every frame needs a whole img_id from 0 to {most}.")
     doubled = sorted(i for i, count in Counter(ids).items() if count > 1)
     if doubled:
         raise CaptureError(f"{file}: frame {doubled[0]} is listed twice.")
@@ -375,4 +378,6 @@ def _numbers(folder: Path, suffix: str) -> set[int]:
     """The numbers that are file names in a folder."""
     if not folder.is_dir():
         return set()
-    return {int(p.stem) for p in folder.iterdir() if p.suffix == suffix and p.stem.isdigit()}
+    return {
+        int(p.stem) for p in folder.iterdir() if p.suffix == suffix and _NUMBER.fullmatch(p.stem)
+    }

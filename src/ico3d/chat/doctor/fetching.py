@@ -1,11 +1,12 @@
 """Answers of a server that may be broken or hostile: read as they are, and only their beginning."""
 
-import json
 import time
 from dataclasses import dataclass
 from typing import Any, cast
 
 import httpx
+
+from ico3d.common.typed import loose_json
 
 PATIENCE = 10.0  # s for an answer
 MOST_BYTES = 1 << 20  # of an answer that are read
@@ -35,8 +36,8 @@ class Answer:
     def table(self) -> dict[str, Any]:
         """The JSON object in the body; empty if it holds none."""
         try:
-            content: object = json.loads(self.body)
-        except (ValueError, RecursionError):
+            content: object = loose_json(self.body)
+        except ValueError:
             return {}
         return cast(dict[str, Any], content) if isinstance(content, dict) else {}
 

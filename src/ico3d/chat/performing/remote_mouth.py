@@ -1,6 +1,5 @@
 """Client of a remote expression module; falls back to the local speech model."""
 
-import json
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -16,6 +15,7 @@ from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.chat.wire.remote_expression import FINISH, PATH, ROW, START
 from ico3d.common.espeak import Phoneme
 from ico3d.common.expression import SPEECH_SIZE
+from ico3d.common.typed import loose_json
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
@@ -103,7 +103,7 @@ class RemoteMouth:
             close_timeout=settings.timeout,
             proxy=None,
         )
-        hello = json.loads(socket.recv(settings.timeout))
+        hello = loose_json(socket.recv(settings.timeout))
         own = {
             "model": self._sha256,
             "rate": SPEECH_RATE,

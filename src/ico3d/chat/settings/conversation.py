@@ -1,7 +1,6 @@
 """Settings of a conversation, read from one file: services, turns, time limits and tools."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ from ico3d.chat.settings.keys import check_key
 from ico3d.chat.settings.mcp import McpServer, check_servers
 from ico3d.chat.settings.tools import Tool, check_tools
 from ico3d.chat.settings.visits import Visits
-from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of, parse_toml
+from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of, loose_json, parse_toml
 from ico3d.errors import SettingsError
 
 MOST_BYTES = 1 << 20
@@ -329,7 +328,7 @@ def _parse(path: Path) -> dict[str, Any]:
         if len(data) > MOST_BYTES:
             raise SettingsError(f"{path}: is larger than {MOST_BYTES} bytes.")
         text = data.decode("utf-8").replace("\r\n", "\n")
-        values = json.loads(text) if path.suffix == ".json" else parse_toml(text)
+        values = loose_json(text) if path.suffix == ".json" else parse_toml(text)
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read ({error.strerror}).") from error
     except (ValueError, RecursionError) as error:

@@ -21,6 +21,7 @@ from pipecat.services.llm_service import FunctionCallParams
 from ico3d.chat.settings.headers import blanked, filled_in
 from ico3d.chat.settings.tools import PORTS, Tool, host_of
 from ico3d.chat.wire.characters import sendable_json
+from ico3d.common.typed import loose_json
 from ico3d.errors import SettingsError
 
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
@@ -182,6 +183,6 @@ async def _body(tool: Tool, response: aiohttp.ClientResponse) -> Any:
             raise Refused(f"its answer has more than {MOST_BYTES} bytes")
     text = blanked(data.decode("utf-8", "replace"), tool.headers, tool.where)
     try:
-        return sendable_json(json.loads(text))
-    except ValueError:
+        return sendable_json(loose_json(text))
+    except (ValueError, RecursionError):  # writing it again needs more depth
         return text

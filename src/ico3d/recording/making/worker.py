@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ico3d.avatar.embodying.look import UNCHANGED, Look
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import json_of, write_atomic
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError, printable
@@ -105,8 +105,8 @@ def _video(person: Person, places: Places) -> Path:
 
 def _before(places: Places) -> list | None:
     try:
-        return json.loads(read_small(places.joined_of, links=False).decode("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        return json_of(places.joined_of, links=False)
+    except (OSError, ValueError):
         return None
 
 

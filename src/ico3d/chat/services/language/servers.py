@@ -1,12 +1,13 @@
 """Lists the models of OpenAI-compatible servers, with a time limit."""
 
-import json
 import re
 import time
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import httpx
+
+from ico3d.common.typed import loose_json
 
 OTHERS = re.compile(r"embed|rerank|whisper|speech|tts|kokoro|piper|transcri", re.IGNORECASE)
 """Parts of names of models that are no language models."""
@@ -22,7 +23,7 @@ def language_models(url: str, key: str, seconds: float) -> list[str]:
         seconds: Time limit.
     """
     try:
-        listed = json.loads(_read(url.rstrip("/") + "/models", key, seconds))
+        listed = loose_json(_read(url.rstrip("/") + "/models", key, seconds))
     except (httpx.HTTPError, httpx.InvalidURL, TimeoutError, ValueError):
         return []
     entries = listed.get("data") if isinstance(listed, dict) else None

@@ -11,7 +11,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import read_object, write_atomic
 from ico3d.common.sound import REQUEST, fault, file_claim
 from ico3d.errors import SettingsError
 
@@ -100,9 +100,5 @@ def record_consent(recording: Recording, statement: str, by: str) -> None:
 
 def read_consent(record: Path) -> dict[str, str] | None:
     """A stored consent; None if there is none that can be read."""
-    try:
-        values = json.loads(read_small(record).decode("utf-8"))
-    except (OSError, ValueError):
-        return None
-    known = isinstance(values, dict) and values.get("statement") and values.get("by")
-    return values if known else None
+    values = read_object(record)
+    return values if values.get("statement") and values.get("by") else None
