@@ -9,7 +9,7 @@ from fastapi.responses import RedirectResponse, Response
 
 from ico3d.chat.settings.conversation import Memory, read_settings
 from ico3d.chat.settings.tools import Tool
-from ico3d.chat.tools.http import MOST_BYTES, Refused, answer, check_address
+from ico3d.chat.tools.http import MOST_BYTES, MOST_DEPTH, Refused, answer, check_address
 from ico3d.errors import SettingsError
 from support.chat.scripted_server import running
 
@@ -118,6 +118,10 @@ class House:
         async def halves():
             return Response('{"a": "\\ud83d"}', media_type="application/json")
 
+        @app.get("/deep")
+        async def deep(depth: int):
+            return Response("[" * depth + "]" * depth, media_type="application/json")
+
         @app.get("/slow")
         async def slow():
             await asyncio.sleep(5)
@@ -168,6 +172,13 @@ async def test_parameters_go_into_path_query_or_body():
 async def test_halves_of_characters_do_not_come_in():
     async with house() as (_, call):
         assert await call("/halves") == {"status": 200, "body": {"a": "\ufffd"}}
+
+
+@pytest.mark.parametrize("depth", [5, 500, 950, 1500])
+async def test_an_answer_of_brackets_alone_is_a_text(depth):
+    async with house() as (_, call):
+        body = (await call(f"/deep?depth={depth}"))["body"]
+        assert isinstance(body, str) == (depth > MOST_DEPTH)
 
 
 async def test_arguments_that_do_not_fit_are_not_sent():

@@ -9,6 +9,7 @@ import ipaddress
 import json
 import socket
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Any
 from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
@@ -25,6 +26,7 @@ from ico3d.common.typed import loose_json
 from ico3d.errors import SettingsError
 
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
+MOST_DEPTH = 100  # of an answer as JSON: what sends it on has less room than what parses it
 MOST_REDIRECTS = 3
 REDIRECTS = (301, 302, 303, 307, 308)
 GLOBAL, NAT64 = ipaddress.ip_network("2000::/3"), ipaddress.ip_network("64:ff9b::/96")
@@ -182,7 +184,15 @@ async def _body(tool: Tool, response: aiohttp.ClientResponse) -> Any:
         if len(data) > MOST_BYTES:
             raise Refused(f"its answer has more than {MOST_BYTES} bytes")
     text = blanked(data.decode("utf-8", "replace"), tool.headers, tool.where)
+    if _depth(text) > MOST_DEPTH:
+        return text
     try:
         return sendable_json(loose_json(text))
-    except (ValueError, RecursionError):  # writing it again needs more depth
+    except ValueError:
         return text
+
+
+def _depth(text: str) -> int:
+    """How deep the brackets of a text are nested, those in quotes among them."""
+    steps = ((c in "[{") - (c in "]}") for c in text)
+    return max(accumulate(steps), default=0)
