@@ -1,11 +1,14 @@
 """The making of an avatar: which video, when anew, and what becomes of errors."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from ico3d.creating.events import Advanced, Made, Measured
 from ico3d.errors import CaptureError
+from ico3d.recording.beside import stop
 from ico3d.recording.keeping.people import People
 from ico3d.recording.making import worker
 from ico3d.recording.making.places import Places
@@ -73,6 +76,7 @@ def test_a_voice_is_cloned_only_of_those_who_agreed_to_it(person, asked, tmp_pat
 def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
     _recorded(person, tmp_path, "consent", "text-1")
     monkeypatch.setattr(worker, "end_with_parent", lambda: None)
+    monkeypatch.setattr(worker, "limit_memory", lambda _: None)  # it would stay
     monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick", "demo"])
     assert worker.main() == 0
     monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick"])
@@ -83,6 +87,30 @@ def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
     assert worker.main() == 0
     looks = [(settings.build, settings.outfit) for settings in asked]
     assert looks == [("medium", "recorded")] * 2 + [("sturdy", "wine")]
+
+
+@pytest.mark.parametrize("library", ["numpy", "torch"])
+def test_a_making_that_takes_more_than_is_free_ends_with_a_sentence(person, tmp_path, library):
+    """In a process of its own, whose limit would stay."""
+    _recorded(person, tmp_path, "consent", "text-1")
+    code = (
+        "import sys\n"
+        f"import {library} as library\n"
+        "from ico3d.recording.making import worker\n"
+        "worker.LEAST_BYTES, worker.free_memory = 64 << 20, lambda: 256 << 20\n"
+        "worker.create = lambda settings, tell: library.ones(1 << 28)\n"
+        f"sys.argv = ['worker', {str(person.folder)!r}, 'quick']\n"
+        "worker.main()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, start_new_session=True
+    )
+    try:
+        assert process.wait(120) == 1
+    finally:
+        stop(process)
+    found = read_progress(Places(person.folder).folder)
+    assert found is not None and (found.state, found.code) == ("failed", "memory")
 
 
 def test_the_same_parts_go_on_and_other_parts_begin_anew(person, asked, tmp_path):
