@@ -32,7 +32,8 @@ from ico3d.recording.making.sources import signature, sources
 TORCH_LACKS = "can't allocate memory"
 """What torch says where memory runs out: its error is a RuntimeError."""
 LEAST_BYTES = 8 << 30
-"""Memory that a making may take where less is free."""
+"""Memory that a making may take where less is free: 12 s of 1080p at `best` took 1.7 GB as its
+training began, on two cores of a shared cloud machine (2026-11-27)."""
 
 
 def make(
