@@ -20,6 +20,9 @@ LARGEST_HEAD = 1 << 16  # bytes
 MOST_HEADERS = 200  # of a request, those behind its body included
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 DESCRIPTORS = 1 << 16  # that a server asks the system for
+UNREAD = b"cookie"
+"""A header that ico3d has no use for, but FastAPI parses before every route; older Python takes the
+square of a quoted value's length for it (CVE-2024-7592), seconds for one head."""
 _open: Counter[str] = Counter()
 
 
@@ -72,14 +75,15 @@ class PromptProtocol(HttpToolsProtocol):
         super().on_message_begin()
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """A header has arrived.
+        """A header has arrived; cookies are left out, for WebSockets, too.
 
         Raises:
             ProtocolError: If it is one too many; the connection is closed.
         """
         if len(self.headers) >= MOST_HEADERS:
             self._cut_off(f"more than {MOST_HEADERS} headers.")
-        super().on_header(name, value)
+        if name.lower() != UNREAD:
+            super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
         """The head of a request has arrived."""
