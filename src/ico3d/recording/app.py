@@ -22,7 +22,8 @@ from ico3d.creating.settings import QUALITIES
 from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError
 from ico3d.recording.guiding.coverage import covered
-from ico3d.recording.guiding.looking import Looks
+from ico3d.recording.guiding.fair_queue import FairQueue
+from ico3d.recording.guiding.looking import MOST_AT_ONCE, Looks
 from ico3d.recording.guiding.seeing import Eye, turn_of
 from ico3d.recording.keeping.body_choice import BUILDS, OUTFITS, as_form, chosen, write_choice
 from ico3d.recording.keeping.people import People
@@ -33,6 +34,7 @@ from ico3d.recording.making.makers import PACKAGED, Bodies, Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE
 from ico3d.recording.making.talks import Talks
+from ico3d.recording.presence import CLIENT_GONE, while_there
 from ico3d.recording.refusals import Refused, full_disk
 
 ROOT = "/recordings/"
@@ -52,6 +54,7 @@ class Room:
         people: The recordings.
         eye: The face tracker, for pictures of the camera.
         looks: Processes that look at parts.
+        queue: Has them look at a few parts at a time, and keeps the parts.
         bodies: Which bodies avatars may get.
         makers: Processes that make avatars.
         talks: Servers of finished avatars.
@@ -63,6 +66,7 @@ class Room:
     people: People
     eye: Eye
     looks: Looks
+    queue: FairQueue
     bodies: Bodies
     makers: Makers
     talks: Talks
@@ -190,18 +194,24 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         return JSONResponse({"size": size})
 
     @app.post(takes + "/keep")
-    async def keep(name: str, id: str, take: str) -> Response:
+    async def keep(name: str, id: str, take: str, request: Request) -> Response:
         person = room.people.person(name)
         file = person.unfinished(id, take)
-        try:
-            report = await room.looks.report(file, id)
-        except Refused as error:
-            if error.code in ("no-video", "costly", "unusable"):
-                person.discard(id, take)
-            raise
-        async with room.lock(name):
-            room.people.person(name)  # may be deleted by now
-            await asyncio.to_thread(person.keep, id, take, report)
+
+        async def look_and_keep() -> None:
+            try:
+                report = await room.looks.report(file, id)
+            except Refused as error:
+                if error.code in ("no-video", "costly", "unusable"):
+                    person.discard(id, take)
+                raise
+            async with room.lock(name):
+                room.people.person(name)  # may be deleted by now
+                await asyncio.to_thread(person.keep, id, take, report)
+
+        kept = room.queue.done(person.name, file, look_and_keep)
+        if not await while_there(request, kept):
+            return Response(status_code=CLIENT_GONE)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.get(part)
@@ -359,4 +369,5 @@ def open_room(
     people.clear()
     makers = Makers(people, bodies)
     servers = makers, Talks(host, tls), Durations(makers.is_busy)
-    return Room(people, Eye(), Looks(), bodies, *servers, voices, defaultdict(asyncio.Lock))
+    looks = Looks(), FairQueue(MOST_AT_ONCE)
+    return Room(people, Eye(), *looks, bodies, *servers, voices, defaultdict(asyncio.Lock))

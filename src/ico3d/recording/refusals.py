@@ -40,6 +40,12 @@ def no_video() -> Refused:
     return Refused("no-video", "this file is no video: choose an MP4, MOV, WebM or AVI.", 415)
 
 
+def nothing_arrived() -> Refused:
+    """A take of which there is nothing, or nothing any more."""
+    text = "nothing of this part has arrived: record it again."
+    return Refused("unknown", text, 404)
+
+
 def costly() -> Refused:
     """A video that would hold up the server."""
     text = "looking at this video takes more time or memory than is given to it: convert it to MP4."

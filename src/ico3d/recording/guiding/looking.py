@@ -19,7 +19,7 @@ from ico3d.creating.looking.advice import Advice
 from ico3d.errors import CaptureError
 from ico3d.recording.beside import end_with_parent, start, stop
 from ico3d.recording.guiding.seeing import Eye
-from ico3d.recording.refusals import Refused, costly
+from ico3d.recording.refusals import Refused, costly, nothing_arrived
 
 LOOK = "ico3d.recording.guiding.looking"
 MOST_AT_ONCE = 2
@@ -35,11 +35,11 @@ SLOWEST = 20.0
 
 
 class Looks:
-    """Processes that look at parts, a few at a time."""
+    """Processes that look at parts, as many as are asked for."""
 
     def __init__(self):
         """Starts none yet."""
-        self._places = asyncio.Semaphore(MOST_AT_ONCE)
+        self._is_closed = False
         self._running: set[subprocess.Popen[bytes]] = set()
 
     async def report(self, file: Path, id: str) -> dict[str, Any]:
@@ -50,24 +50,30 @@ class Looks:
             id: The part.
 
         Raises:
-            Refused: As `Eye.report`, or if it takes too much time or memory.
+            Refused: As `Eye.report`, or if it takes too much time or memory, or was deleted.
+            CaptureError: If the process fails, or the looks have been ended.
         """
-        async with self._places:
-            return await asyncio.to_thread(self._report, file, id)
+        return await asyncio.to_thread(self._report, file, id)
 
     def close(self) -> None:
-        """Ends the looks that go on."""
+        """Ends the looks that go on, and those that would follow."""
+        self._is_closed = True
         for process in list(self._running):
             stop(process)
 
     def _report(self, file: Path, id: str) -> dict[str, Any]:
-        size = file.stat().st_size if file.is_file() else 0  # it may be deleted by now
+        try:
+            size = file.stat().st_size
+        except FileNotFoundError as error:
+            raise nothing_arrived() from error
         seconds = SECONDS + SECONDS_PER_MEGABYTE * size / 1e6
         words = [str(file), id, str(seconds), str(MOST_BYTES)]
         process = start(LOOK, words, subprocess.PIPE, errors=None)
         self._running.add(process)
         slow = threading.Timer(SLOWEST * seconds, process.kill)
         slow.start()
+        if self._is_closed:
+            process.kill()
         try:
             assert process.stdout is not None
             told = process.stdout.read()
@@ -76,6 +82,8 @@ class Looks:
             slow.cancel()
             self._running.discard(process)
             stop(process)
+        if self._is_closed:
+            raise CaptureError(f"{file.name}: the server ended while it was looked at.")
         if status < 0:
             raise costly()
         if status:

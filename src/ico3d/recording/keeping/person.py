@@ -10,7 +10,7 @@ from ico3d.common.files import read_small, write_atomic
 from ico3d.common.typed import parse_json
 from ico3d.recording.keeping.containers import HEAD, suffix_of
 from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD, scripts
-from ico3d.recording.refusals import Refused, no_video
+from ico3d.recording.refusals import Refused, no_video, nothing_arrived
 
 CONSENT_FILE = "consent.json"
 PARTS, MAKING = "parts", "making"
@@ -143,7 +143,7 @@ class Person:
         """
         file = self._take(id, take)
         if not file.is_file():
-            raise Refused("unknown", "nothing of this part has arrived: record it again.", 404)
+            raise nothing_arrived()
         return file
 
     def keep(self, id: str, take: str, report: dict[str, Any]) -> None:

@@ -1,0 +1,107 @@
+"""Work that people ask for: a few pieces at a time, each person in turn.
+
+Who asks for a hundred pieces keeps nobody else waiting for more than those that have begun, and the
+next.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable, Hashable
+from dataclasses import dataclass
+
+Work = Callable[[], Awaitable[None]]
+
+
+@dataclass(eq=False)
+class _Piece:
+    """Work that somebody waits for.
+
+    Attributes:
+        whose: Who asked for it.
+        key: What it is.
+        work: Does it.
+        result: Done once the work is; fails as it did.
+        askers: How many wait for it.
+    """
+
+    whose: str
+    key: Hashable
+    work: Work
+    result: asyncio.Future[None]
+    askers: int = 0
+
+
+class FairQueue:
+    """Pieces of work, each done once however many ask for it meanwhile."""
+
+    def __init__(self, places: int):
+        """Takes how many pieces are done at a time."""
+        self._free = places
+        self._pieces: dict[Hashable, _Piece] = {}
+        self._waiting: dict[str, deque[_Piece]] = {}
+        """Pieces that have not begun, by person; whose turn is next comes first."""
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def done(self, whose: str, key: Hashable, work: Work) -> None:
+        """Returns when a piece of work is done.
+
+        If all who wait for it are cancelled before it has begun, it is not done; else it is done to
+        its end.
+
+        Args:
+            whose: Who asks for it.
+            key: What it is: if it waits or is being done already, that is joined.
+            work: Does it.
+
+        Raises:
+            Exception: Whatever the work raises.
+        """
+        piece = self._pieces.get(key) or self._add(whose, key, work)
+        piece.askers += 1
+        self._begin_next()
+        try:
+            await asyncio.shield(piece.result)
+        finally:
+            piece.askers -= 1
+            if not piece.askers:
+                self._drop(piece)
+
+    def _add(self, whose: str, key: Hashable, work: Work) -> _Piece:
+        result = asyncio.get_running_loop().create_future()
+        result.add_done_callback(lambda done: done.cancelled() or done.exception())  # all left
+        self._pieces[key] = piece = _Piece(whose, key, work, result)
+        self._waiting.setdefault(whose, deque()).append(piece)
+        return piece
+
+    def _drop(self, piece: _Piece) -> None:
+        """Forgets a piece that has not begun."""
+        line = self._waiting.get(piece.whose, ())
+        if piece in line:
+            del self._pieces[piece.key]
+            line.remove(piece)
+            if not line:
+                del self._waiting[piece.whose]
+
+    def _begin_next(self) -> None:
+        """Begins as many pieces as there are places for."""
+        while self._free and self._waiting:
+            whose = next(iter(self._waiting))
+            line = self._waiting.pop(whose)
+            task = asyncio.create_task(self._do(line.popleft()))
+            if line:
+                self._waiting[whose] = line  # behind everybody else
+            self._free -= 1
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    async def _do(self, piece: _Piece) -> None:
+        try:
+            await piece.work()
+            piece.result.set_result(None)
+        except Exception as error:
+            piece.result.set_exception(error)
+        finally:
+            piece.result.cancel()  # unless it is done
+            del self._pieces[piece.key]
+            self._free += 1
+            self._begin_next()

@@ -1,0 +1,101 @@
+"""Who asks often that a part be kept, or does not wait for it, holds up nobody else."""
+
+import asyncio
+
+import httpx
+import pytest
+
+from ico3d.chat.serving.sites import Sites
+from ico3d.recording import app as studio
+from ico3d.recording.guiding.looking import MOST_AT_ONCE
+from support.chat.serving import running
+from support.needs import needs
+from support.studio_page.parts import begun, part_file
+
+pytestmark = [needs("av"), pytest.mark.slow]
+REPORT = {"seconds": 1.0, "turn": None, "advice": []}
+KEEP = b"POST /recordings/%s/takes/%s/keep HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
+
+
+@pytest.fixture
+async def server(tmp_path, monkeypatch):
+    """The port of a server, the looks that have begun, and what lets them end.
+
+    Eve has eight takes, Bob has one.
+    """
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    folder, data = tmp_path / "people", part_file(tmp_path / "a.mp4").read_bytes()
+    room = studio.open_room(folder, "127.0.0.1", False)
+    for name, takes in (("Eve", 8), ("Bob", 1)):
+        person = begun(folder, name)
+        for n in range(takes):
+            person.append(f"text-{n % 2 + 1}", f"a{n}", 0, data)
+    looks, may_end = [], asyncio.Event()
+
+    async def report(file, id):
+        looks.append((file.parent.parent.name, file.name))
+        await may_end.wait()
+        return REPORT
+
+    monkeypatch.setattr(room.looks, "report", report)
+    async with running(studio.make_app(room, "127.0.0.1", Sites())) as (_, listener):
+        yield listener.getsockname()[1], looks, may_end
+
+
+async def _ask(port, name, take):
+    _, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(KEEP % (name, take))
+    await writer.drain()
+    return writer
+
+
+async def _takes(port, name):
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=60) as client:
+        parts = (await client.get(f"/recordings/{name}")).json()["parts"]
+        return {one["id"]: one["state"] for one in parts if one["state"] != "missing"}
+
+
+async def test_abandoned_requests_are_looked_at_once_or_not_at_all(server):
+    port, looks, may_end = server
+    takes = [b"text-%d/a%d" % (n % 2 + 1, n) for n in range(4)]
+    asked = [await _ask(port, b"Eve", take) for take in takes for _ in range(15)]
+    await asyncio.sleep(0.5)
+    for writer in asked:
+        writer.close()
+    await asyncio.sleep(0.5)
+    assert len(looks) == len(set(looks)) == MOST_AT_ONCE  # of 60 requests
+    bob = await _ask(port, b"Bob", b"text-1/a0")
+    may_end.set()
+    async with asyncio.timeout(30):
+        while (await _takes(port, "Bob")).get("text-1") != "kept":
+            await asyncio.sleep(0.05)
+    assert len(looks) == MOST_AT_ONCE + 1 and looks[-1][0] == "Bob"
+    assert "kept" in (await _takes(port, "Eve")).values()  # what had begun was not in vain
+    bob.close()
+
+
+async def test_a_person_with_many_parts_keeps_another_waiting_for_one(server):
+    port, looks, may_end = server
+    takes = [b"text-%d/a%d" % (n % 2 + 1, n) for n in range(4, 8)]
+    asked = [await _ask(port, b"Eve", take) for take in takes]
+    await asyncio.sleep(0.3)
+    asked.append(await _ask(port, b"Bob", b"text-1/a0"))
+    await asyncio.sleep(0.3)
+    may_end.set()
+    async with asyncio.timeout(30):
+        while len(looks) < 5:
+            await asyncio.sleep(0.05)
+    assert [name for name, _ in looks].index("Bob") <= MOST_AT_ONCE + 1
+    for writer in asked:
+        writer.close()
+
+
+async def test_all_who_ask_for_one_part_are_told_that_it_is_kept(server):
+    port, looks, may_end = server
+    url = "/recordings/Bob/takes/text-1/a0/keep"
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=60) as client:
+        asked = [asyncio.create_task(client.post(url)) for _ in range(5)]
+        await asyncio.sleep(0.5)
+        may_end.set()
+        answers = await asyncio.gather(*asked)
+    assert [one.status_code for one in answers] == [200] * 5 and len(looks) == 1
