@@ -1,13 +1,18 @@
 """Answers of MCP servers that would fill the memory are cut."""
 
+import asyncio
 import gzip
 
 import pytest
 from fastapi import FastAPI, Request, Response
+from fastapi.responses import JSONResponse
 
+from ico3d.chat.settings.mcp import McpServer
+from ico3d.chat.tools.mcp import Connection
 from support.chat.scripted_server import running
 
 httpx2 = pytest.importorskip("httpx2")
+NO_METHOD = {"code": -32601, "message": "no such method"}
 
 
 async def test_answers_are_short_and_plain(monkeypatch):
@@ -96,3 +101,69 @@ async def test_events_without_data_count(answered, pieces):
 async def test_events_are_utf_8_whatever_their_type_says(answered, coding):
     hidden = (b"id:1\\n\\n", b"id:1+AAoACg-", b"id:1")
     assert await answered(hidden * 100, f"text/event-stream; charset={coding}") == []
+
+
+def _hasty(is_resumed):
+    """An MCP server whose streams end at once and are to be opened again at once, without end.
+
+    Args:
+        is_resumed: Whether it is the answer to a call that is resumed so, else the one stream that
+            each client opens.
+
+    Returns:
+        It, and the methods of the requests that come.
+    """
+    app, methods = FastAPI(), []
+    again = Response(b"id: 1\nretry: 0\ndata:\n\n", media_type="text/event-stream")
+
+    @app.post("/mcp")
+    async def call(request: Request) -> Response:
+        message = await request.json()
+        asked = message.get("method")
+        methods.append(asked)
+        if asked == "tools/list" and is_resumed:
+            return again
+        results = {
+            "initialize": {
+                "protocolVersion": message.get("params", {}).get("protocolVersion"),
+                "capabilities": {"tools": {}},
+                "serverInfo": {"name": "hasty", "version": "1"},
+            },
+            "tools/list": {"tools": [{"name": "t", "inputSchema": {"type": "object"}}]},
+        }
+        if "id" not in message:
+            return Response(status_code=202)
+        told = {"result": results[asked]} if asked in results else {"error": NO_METHOD}
+        answer = {"jsonrpc": "2.0", "id": message["id"], **told}
+        return JSONResponse(answer, headers={"mcp-session-id": "s"})
+
+    @app.get("/mcp")
+    async def stream(request: Request) -> Response:
+        methods.append("GET")
+        is_first = "last-event-id" not in request.headers
+        return Response(status_code=405) if is_resumed and is_first else again
+
+    return app, methods
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("is_resumed", [False, True])
+async def test_streams_are_not_opened_again_without_a_pause(monkeypatch, is_resumed):
+    from ico3d.chat.tools import bounded_http
+
+    monkeypatch.setattr(bounded_http, "STREAMS_AT_ONCE", 3.0)
+    app, methods = _hasty(is_resumed)
+    async with running(app) as port:
+        connection = Connection(McpServer("m", url=f"http://127.0.0.1:{port}/mcp", seconds=2))
+        asked = asyncio.create_task(connection.functions())
+        await asyncio.sleep(2.5)
+        assert 3 <= methods.count("GET") <= 3 + 4
+        if is_resumed:
+            with pytest.raises(TimeoutError):
+                await asked
+        else:
+            assert [one.name for one in await asked] == ["m_t"]
+        before = len(methods)
+        assert "error" in await connection.call("t", {})  # at once, whatever waits
+        assert "tools/call" in methods[before:]
+        await connection.close()

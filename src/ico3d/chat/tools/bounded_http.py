@@ -1,5 +1,6 @@
 """HTTP for MCP servers, whose answers cannot fill the memory. Imported only where mcp is."""
 
+import asyncio
 import time
 from collections.abc import AsyncIterator
 
@@ -13,18 +14,23 @@ MOST_BYTES = 4 << 20
 LINE_RATE, LINES_AT_ONCE = 200.0, 4000.0
 """Lines of a server's events per second for long, and at once: each costs the loop of all visitors
 time. An event has three or four."""
+STREAM_RATE, STREAMS_AT_ONCE = 1.0, 10.0
+"""Requests per second for long, and at once, by which the SDK opens and resumes streams: where a
+server says so (`retry: 0`), it does that again without a pause."""
 
 
 class BoundedTransport(httpx2.AsyncHTTPTransport):
     """Reads no more of an answer than `MOST_BYTES`, and none that is compressed.
 
-    A stream of events may go on for long: the SDK bounds each of them, and this their number.
+    A stream of events may go on for long: the SDK bounds each of them, and this their number. What
+    opens streams anew waits if that is too soon; calls, which are sent by POST, do not.
     """
 
     def __init__(self, trust_env: bool = True):
         """Connects; proxies that the environment names are used if that is trusted."""
         super().__init__(trust_env=trust_env)
         self._lines = Bucket(LINE_RATE, LINES_AT_ONCE, time.monotonic)  # of all streams
+        self._streams = Bucket(STREAM_RATE, STREAMS_AT_ONCE, time.monotonic)
 
     async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
         """Sends a request.
@@ -34,6 +40,9 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
                 events.
         """
         await ask_plain(request)
+        if request.method == "GET":
+            while not self._streams.take(1):
+                await asyncio.sleep(1 / STREAM_RATE)
         response = await super().handle_async_request(request)
         await ensure_plain(response)
         paced = is_events(response)
