@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 
 import pytest
 from fastapi import FastAPI, Request
@@ -179,6 +180,19 @@ async def test_an_answer_of_brackets_alone_is_a_text(depth):
     async with house() as (_, call):
         body = (await call(f"/deep?depth={depth}"))["body"]
         assert isinstance(body, str) == (depth > MOST_DEPTH)
+
+
+async def test_what_is_nested_deep_is_no_failure_of_the_talk():
+    deep = json.loads("[" * 900 + "]" * 900)
+    for _ in range(200):
+        deep = [deep]
+    async with house() as (rooms, call):
+        brackets = "[" * 8_000 + "]" * 8_000
+        assert await call("/deep?depth=8000") == {"status": 200, "body": brackets}
+        for method in ("GET", "POST"):
+            told = await call("/echo/", {"a": deep}, method)
+            assert told == {"error": "t failed: its arguments are nested too deep."}
+    assert not rooms.seen
 
 
 async def test_arguments_that_do_not_fit_are_not_sent():

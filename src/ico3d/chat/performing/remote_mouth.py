@@ -20,7 +20,8 @@ from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
 AVOIDED = 20.0  # s for which a server that failed is not asked again
-FAILURES = (OSError, WebSocketException, Ico3dError, ValueError)  # TimeoutError is an OSError
+FAILURES = (OSError, WebSocketException, Ico3dError, ValueError, RecursionError)
+"""TimeoutError is an OSError; JSON may be nested too deep."""
 
 
 class RemoteMouth:

@@ -109,6 +109,8 @@ async def answer(
         return {"error": f"{tool.name} did not answer within {tool.seconds:g} seconds."}
     except aiohttp.ClientConnectorError as error:
         return {"error": f"{tool.name} cannot be reached: {error.os_error}."}
+    except RecursionError:
+        return {"error": f"{tool.name} failed: its arguments are nested too deep."}
     except (Refused, SettingsError, aiohttp.ClientError, ValueError) as error:
         said = str(error).rstrip(".") or type(error).__name__
         return {"error": f"{tool.name} failed: {said}."}
