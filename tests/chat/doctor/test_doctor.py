@@ -4,12 +4,13 @@ import asyncio
 import contextlib
 import gzip
 import itertools
+import socket
 import threading
+import time
 from datetime import UTC, datetime
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-import httpx
 import pytest
 from websockets.asyncio.server import serve
 
@@ -68,10 +69,9 @@ async def test_a_server_that_asks_for_a_key(bundle):
 
 async def test_a_name_that_the_server_does_not_know(bundle):
     async with serving(bundle, TYPED) as (url, _):
-        place = Place.of(url)
-        headers = {"Host": "avatar.example"}
-        with httpx.Client(base_url=url, headers=headers) as client:
-            found = await asyncio.to_thread(deployment.of_server, client, place)
+        place = Place.of(url.replace("127.0.0.1", "127.1"))  # leads there, but is another name
+        client = fetching.Client(place.url)
+        found = await asyncio.to_thread(deployment.of_server, client, place)
     assert found.grade == "bad" and f"--name {place.host}" in found.mend
 
 
@@ -159,8 +159,8 @@ def test_an_answer_without_end_is_not_read_and_a_small_one_not_made_large():
         ({}, itertools.repeat(zeros), fetching.MOST_BYTES),
         ({"Content-Encoding": "gzip"}, [packed], len(packed)),
     ]:
-        with answering(headers, pieces) as url, fetching.client_of(url) as client:
-            answer = fetching.fetch(client, "/")
+        with answering(headers, pieces) as url:
+            answer = fetching.fetch(fetching.Client(url), "/")
         assert answer.status == 200 and len(answer.body) == most and not answer.table
     assert answer.text == ""
 
@@ -171,8 +171,14 @@ def test_no_proxy_gets_what_is_for_the_server(monkeypatch):
             monkeypatch.setenv(name, proxy)
         for name in ("NO_PROXY", "no_proxy"):
             monkeypatch.delenv(name, raising=False)
-        with fetching.client_of(url) as client:
-            assert fetching.fetch(client, "/").text == "the server"
+        assert fetching.fetch(fetching.Client(url), "/").text == "the server"
+
+
+def test_cookies_of_a_proxy_are_kept():
+    with answering({"Set-Cookie": "place=3"}, []) as url:
+        client = fetching.Client(url)
+        fetching.fetch(client, "/")
+    assert dict(client.cookies) == {"place": "3"}
 
 
 async def test_what_breaks_off_is_a_finding():
@@ -195,3 +201,46 @@ async def test_a_server_that_says_nothing_is_not_waited_for(monkeypatch):
         assert told(await visitor.findings())[-1].startswith(
             "no conversation begins (nothing came for 0.2 s)"
         )
+
+
+@contextlib.contextmanager
+def dripping(begins):
+    """A port at which an answer begins so, and goes on with a letter now and then, without end."""
+
+    def drip(wire):
+        with contextlib.suppress(OSError), wire:
+            wire.recv(1 << 16)
+            wire.sendall(begins)
+            while True:
+                wire.sendall(b"a")
+                time.sleep(0.05)
+
+    def accept():
+        with contextlib.suppress(OSError):
+            while True:
+                threading.Thread(target=drip, args=(listener.accept()[0],), daemon=True).start()
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        threading.Thread(target=accept, daemon=True).start()
+        yield listener.getsockname()[1]
+        listener.shutdown(socket.SHUT_RDWR)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "begins", "said"),
+    [
+        ("http", b"HTTP/1.1 200 OK\r\nX-Long: ", "no answer (ReadTimeout)"),
+        ("https", b"\x16\x03\x03\x3f\xff", "no TLS connection (not within"),
+    ],
+)
+def test_an_answer_that_drips_is_not_waited_for(monkeypatch, scheme, begins, said):
+    monkeypatch.setattr(fetching, "PATIENCE", 0.5)
+    monkeypatch.setattr(deployment, "PATIENCE", 0.5)
+    with dripping(begins) as port:
+        began, found = time.monotonic(), []
+        for one in deployment.findings(f"{scheme}://127.0.0.1:{port}"):
+            found.append(one)
+            if time.monotonic() - began > 5:
+                break
+    assert any(one.what.startswith(said) for one in found), found
+    assert time.monotonic() - began < 5

@@ -6,12 +6,13 @@ import ssl
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
 
 from ico3d.chat.doctor import visit
-from ico3d.chat.doctor.fetching import PATIENCE, client_of, fetch
+from ico3d.chat.doctor.fetching import PATIENCE, Client, fetch
 from ico3d.chat.doctor.finding import Finding, bad, good, weak
 from ico3d.chat.serving.guard import LOOPBACK
 from ico3d.errors import SettingsError
@@ -87,16 +88,13 @@ def findings(url: str, key: str = "") -> Iterator[Finding]:
     if key and not proven:
         yield unsent(place)
         key = ""
-    with client_of(place.url, context) as client:
-        try:
-            yield from of_site(client, place, context, key)
-        except httpx.HTTPError as error:
-            yield bad(f"an answer broke off ({type(error).__name__})", LOGS)
+    try:
+        yield from of_site(Client(place.url, context), place, context, key)
+    except httpx.HTTPError as error:
+        yield bad(f"an answer broke off ({type(error).__name__})", LOGS)
 
 
-def of_site(
-    client: httpx.Client, place: Place, context: ssl.SSLContext, key: str
-) -> Iterator[Finding]:
+def of_site(client: Client, place: Place, context: ssl.SSLContext, key: str) -> Iterator[Finding]:
     """Looks at what is served, and visits it.
 
     Raises:
@@ -154,11 +152,7 @@ def of_way(place: Place) -> Finding:
 def of_certificate(place: Place, context: ssl.SSLContext) -> Finding:
     """Whether browsers believe the certificate, and for how long."""
     try:
-        with (
-            socket.create_connection((place.host, place.port or 443), PATIENCE) as plain,
-            context.wrap_socket(plain, server_hostname=place.host) as secure,
-        ):
-            until = (secure.getpeercert() or {}).get("notAfter")
+        until = asyncio.run(_certificate(place, context)).get("notAfter")
     except ssl.SSLCertVerificationError as error:
         return bad(
             f"browsers warn of the certificate ({error.verify_message})",
@@ -166,14 +160,28 @@ def of_certificate(place: Place, context: ssl.SSLContext) -> Finding:
             "further ones here).",
         )
     except OSError as error:
-        return bad(f"no TLS connection ({error})", "look at the proxy's log.")
+        why = str(error) or f"not within {PATIENCE:g} s"
+        return bad(f"no TLS connection ({why})", "look at the proxy's log.")
     days = (ssl.cert_time_to_seconds(str(until)) - time.time()) / 86400
     if days < RENEWED and place.host not in LOOPBACK:
         return weak(f"the certificate ends in {days:.0f} days", "see why nothing renews it.")
     return good(f"the certificate is valid for {days:.0f} days")
 
 
-def of_server(client: httpx.Client, place: Place) -> Finding:
+async def _certificate(place: Place, context: ssl.SSLContext) -> dict[str, Any]:
+    """What the certificate says.
+
+    Raises:
+        OSError: If there is no TLS connection, or not in time.
+    """
+    async with asyncio.timeout(PATIENCE):
+        port = place.port or 443
+        _, writer = await asyncio.open_connection(place.host, port, ssl=context)
+    writer.transport.abort()
+    return writer.get_extra_info("peercert") or {}
+
+
+def of_server(client: Client, place: Place) -> Finding:
     """Whether the server is up, and takes visitors under this name."""
     try:
         answer = fetch(client, "/ready")
@@ -194,7 +202,7 @@ def of_server(client: httpx.Client, place: Place) -> Finding:
     return good("the server is ready for visitors")
 
 
-def of_page(client: httpx.Client) -> Iterator[Finding]:
+def of_page(client: Client) -> Iterator[Finding]:
     """Whether the page comes whole, protected and compressed, and figures do not."""
     page = fetch(client, "/")
     if page.status != 200:
@@ -211,7 +219,7 @@ def of_page(client: httpx.Client) -> Iterator[Finding]:
         yield good("figures are not public")
 
 
-def token_for(client: httpx.Client, key: str) -> str | None:
+def token_for(client: Client, key: str) -> str | None:
     """What admits a page, for a key; None if it is wrong."""
     headers = {"Authorization": f"Bearer {key}", "Accept-Encoding": "identity"}
     answer = fetch(client, "/token", "POST", headers=headers)
@@ -219,7 +227,7 @@ def token_for(client: httpx.Client, key: str) -> str | None:
     return token if answer.status == 200 and isinstance(token, str) else None
 
 
-def of_bundle(client: httpx.Client, token: str | None) -> Finding:
+def of_bundle(client: Client, token: str | None) -> Finding:
     """Whether the bundle is served to those who are admitted."""
     parameters = {"token": token} if token else {}
     manifest = fetch(client, "/bundle/manifest.json", params=parameters)
@@ -236,8 +244,7 @@ def of_bundle(client: httpx.Client, token: str | None) -> Finding:
 def of_plain(place: Place) -> Finding:
     """Whether who types the name alone is led to HTTPS."""
     try:
-        with client_of(replace(place, scheme="http", port=None).url) as client:
-            answer = fetch(client, "/")
+        answer = fetch(Client(replace(place, scheme="http", port=None).url), "/")
     except httpx.HTTPError:
         return weak("port 80 does not answer", "open it: who types the name alone begins there.")
     if answer.headers.get("location", "").startswith("https://"):

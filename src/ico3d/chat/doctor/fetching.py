@@ -1,14 +1,15 @@
 """Answers of a server that may be broken or hostile: read as they are, and only their beginning."""
 
-import time
-from dataclasses import dataclass
+import asyncio
+import contextlib
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 import httpx
 
 from ico3d.common.typed import loose_json
 
-PATIENCE = 10.0  # s for an answer
+PATIENCE = 10.0  # s for an answer as a whole
 MOST_BYTES = 1 << 20  # of an answer that are read
 
 
@@ -42,25 +43,54 @@ class Answer:
         return cast(dict[str, Any], content) if isinstance(content, dict) else {}
 
 
-def client_of(url: str, verify: Any = True) -> httpx.Client:
-    """A client for a server; it is patient for a while.
+@dataclass(frozen=True)
+class Client:
+    """A client of a server, which keeps cookies, by which a proxy knows a visitor.
+
+    Attributes:
+        url: The server's address.
+        verify: Which certificates are believed, as httpx takes it.
+        cookies: What the server has set.
+    """
+
+    url: str
+    verify: Any = True
+    cookies: httpx.Cookies = field(default_factory=httpx.Cookies)
+
+
+def fetch(client: Client, path: str, method: str = "GET", **request: Any) -> Answer:
+    """Asks a server, which is waited for `PATIENCE` seconds, however its answer drips.
 
     It asks the server itself. A proxy that the environment names could read what is unencrypted,
     keys included, and what it answers says nothing of the server.
-    """
-    return httpx.Client(base_url=url, verify=verify, timeout=PATIENCE, trust_env=False)
-
-
-def fetch(client: httpx.Client, path: str, method: str = "GET", **request: Any) -> Answer:
-    """Asks a server.
 
     Raises:
-        HTTPError: If there is no answer.
+        HTTPError: If there is no answer, or its head does not come in time.
     """
-    body, end = bytearray(), time.monotonic() + PATIENCE
-    with client.stream(method, path, **request) as answer:
-        for piece in answer.iter_raw():
-            body += piece
-            if len(body) > MOST_BYTES or time.monotonic() > end:
-                break
+    return asyncio.run(_fetched(client, path, method, request))
+
+
+async def _fetched(client: Client, path: str, method: str, request: dict[str, Any]) -> Answer:
+    body = bytearray()
+    async with httpx.AsyncClient(
+        base_url=client.url,
+        verify=client.verify,
+        timeout=PATIENCE,
+        trust_env=False,
+        cookies=client.cookies.jar,
+    ) as http:
+        sent = http.build_request(method, path, **request)
+        end = asyncio.get_running_loop().time() + PATIENCE
+        try:
+            async with asyncio.timeout_at(end):
+                answer = await http.send(sent, stream=True)
+        except TimeoutError as error:
+            raise httpx.ReadTimeout(f"no head of an answer in {PATIENCE:g} s") from error
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout_at(end):
+                async for piece in answer.aiter_raw():
+                    body += piece
+                    if len(body) > MOST_BYTES:
+                        break
+        await answer.aclose()
         return Answer(answer.status_code, answer.headers, bytes(body[:MOST_BYTES]))
