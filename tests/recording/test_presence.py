@@ -1,6 +1,7 @@
 """Who asks often that a part be kept, or does not wait for it, holds up nobody else."""
 
 import asyncio
+import time
 
 import httpx
 import pytest
@@ -15,6 +16,7 @@ from support.studio_page.parts import begun, part_file
 pytestmark = [needs("av"), pytest.mark.slow]
 REPORT = {"seconds": 1.0, "turn": None, "advice": []}
 KEEP = b"POST /recordings/%s/takes/%s/keep HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
+LOOK = b"POST /recordings/Eve/look HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1\r\n\r\nx"
 
 
 @pytest.fixture
@@ -37,7 +39,14 @@ async def server(tmp_path, monkeypatch):
         await may_end.wait()
         return REPORT
 
+    def told(picture, _):
+        looks.append(("picture", picture))
+        while not may_end.is_set():
+            time.sleep(0.01)
+        return {"is": "seen"}
+
     monkeypatch.setattr(room.looks, "report", report)
+    monkeypatch.setattr(room.eye, "told", told)
     async with running(studio.make_app(room, "127.0.0.1", Sites())) as (_, listener):
         yield listener.getsockname()[1], looks, may_end
 
@@ -88,6 +97,23 @@ async def test_a_person_with_many_parts_keeps_another_waiting_for_one(server):
     assert [name for name, _ in looks].index("Bob") <= MOST_AT_ONCE + 1
     for writer in asked:
         writer.close()
+
+
+async def test_pictures_that_nobody_waits_for_are_not_looked_at(server):
+    port, looks, may_end = server
+    asked = []
+    for _ in range(30):
+        _, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(LOOK)
+        asked.append(writer)
+    await asyncio.sleep(0.5)
+    for writer in asked:
+        writer.close()
+    await asyncio.sleep(0.5)
+    may_end.set()
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=60) as client:
+        assert (await client.post("/recordings/Bob/look", content=b"x")).json() == {"is": "seen"}
+    assert looks == [("picture", b"x")] * 2  # the one that had begun, and Bob's
 
 
 async def test_all_who_ask_for_one_part_are_told_that_it_is_kept(server):

@@ -23,6 +23,7 @@ from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError
 from ico3d.recording.guiding.coverage import covered
 from ico3d.recording.guiding.fair_queue import FairQueue
+from ico3d.recording.guiding.guide import Told
 from ico3d.recording.guiding.looking import MOST_AT_ONCE, Looks
 from ico3d.recording.guiding.seeing import Eye, turn_of
 from ico3d.recording.keeping.body_choice import BUILDS, OUTFITS, as_form, chosen, write_choice
@@ -53,6 +54,7 @@ class Room:
     Attributes:
         people: The recordings.
         eye: The face tracker, for pictures of the camera.
+        glances: Has it look at one picture at a time.
         looks: Processes that look at parts.
         queue: Has them look at a few parts at a time, and keeps the parts.
         bodies: Which bodies avatars may get.
@@ -65,6 +67,7 @@ class Room:
 
     people: People
     eye: Eye
+    glances: FairQueue
     looks: Looks
     queue: FairQueue
     bodies: Bodies
@@ -231,10 +234,16 @@ def _add_parts(app: FastAPI, room: Room) -> None:
 
     @app.post(ROOT + "{name}/look")
     async def look(name: str, request: Request, part: str = "") -> Response:
-        room.people.person(name)
+        person = room.people.person(name)
         picture = await _body(request, LARGEST_PICTURE)
-        told = await asyncio.to_thread(room.eye.told, picture, turn_of(part))
-        return JSONResponse(plain(told))
+        told: list[Told] = []
+
+        async def see() -> None:
+            told.append(await asyncio.to_thread(room.eye.told, picture, turn_of(part)))
+
+        if not await while_there(request, room.glances.done(person.name, object(), see)):
+            return Response(status_code=CLIENT_GONE)
+        return JSONResponse(plain(told[0]))
 
 
 def _add_making(app: FastAPI, room: Room) -> None:
@@ -369,5 +378,5 @@ def open_room(
     people.clear()
     makers = Makers(people, bodies)
     servers = makers, Talks(host, tls), Durations(makers.is_busy)
-    looks = Looks(), FairQueue(MOST_AT_ONCE)
-    return Room(people, Eye(), *looks, bodies, *servers, voices, defaultdict(asyncio.Lock))
+    seeing = Eye(), FairQueue(1), Looks(), FairQueue(MOST_AT_ONCE)
+    return Room(people, *seeing, bodies, *servers, voices, defaultdict(asyncio.Lock))

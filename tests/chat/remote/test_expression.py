@@ -147,6 +147,13 @@ async def test_any_nonsense_is_answered_by_the_own_model(model, sha256, sound, k
     np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
 
 
+async def test_a_greeting_nested_deep_is_nonsense_too(model, sha256, sound):
+    async with serving(Odd("[" * 50_000, None)) as url:
+        made = mouth(url, model, sha256, LONG)
+        rows, _ = await asyncio.to_thread(remote, made, sound)
+    np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+
+
 async def test_the_socket_is_guarded(bundle):
     app = expression_app(bundle, Limits(requests=1), key="sesame")
     async with serving(app) as url:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from fastapi import FastAPI
-from fastapi.responses import RedirectResponse, StreamingResponse
+from fastapi.responses import RedirectResponse, Response, StreamingResponse
 
 from ico3d.chat.memory import PROMPT
 from ico3d.chat.performing.moods import BROWS, EASE
@@ -257,8 +257,10 @@ async def test_what_is_no_language_model_is_not_taken_for_one(monkeypatch):
     app.get("/elsewhere/models")(lambda: RedirectResponse("/other"))
     app.get("/list/models")(lambda: [1, 2])
     app.get("/odd/models")(lambda: {"data": [{"id": 3}, 4, {"id": "whisper-large-v3"}]})
+    app.get("/deep/models")(lambda: Response("[" * 100_000))
     async with running(app) as port:
-        urls = [f"http://127.0.0.1:{port}/{x}" for x in ("slow", "elsewhere", "list", "odd", "no")]
+        places = ("slow", "elsewhere", "list", "odd", "deep", "no")
+        urls = [f"http://127.0.0.1:{port}/{x}" for x in places]
         began = asyncio.get_running_loop().time()
         assert await asyncio.to_thread(first_server, urls, 0.25) is None
         assert asyncio.get_running_loop().time() - began < 5  # of one that never ends
