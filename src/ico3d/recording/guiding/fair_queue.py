@@ -75,8 +75,8 @@ class FairQueue:
 
     def _drop(self, piece: _Piece) -> None:
         """Forgets a piece that has not begun."""
-        line = self._waiting.get(piece.whose, ())
-        if piece in line:
+        line = self._waiting.get(piece.whose)
+        if line and piece in line:
             del self._pieces[piece.key]
             line.remove(piece)
             if not line:
