@@ -1,6 +1,7 @@
 """Bodies on disk."""
 
 import json
+import tracemalloc
 
 import pytest
 import torch
@@ -11,7 +12,9 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.errors import ModelError
 from ico3d.training.checkpoint import load_tensors, save_tensors
+from support.bodies.skinned_model import trained_like
 from support.bodies.window_parts import ENCODED, canonical
+from support.bundles.random_skinned import random_skinned
 
 
 @pytest.fixture
@@ -107,3 +110,116 @@ def test_a_window_that_cannot_be_drawn_is_refused_when_it_is_read(body, tmp_path
     save_tensors(tmp_path / "0.safetensors", tensors, about)
     with pytest.raises(ModelError, match="does not hold a window of a body"):
         TrainedBody.load(tmp_path)
+
+
+SKELETAL = trained_like(random_skinned())
+DEFORMED = WindowModel(
+    ENCODED,
+    {**canonical(), "alpha": torch.rand(5, 2)},
+    ENCODED.initial(torch.Generator().manual_seed(4)),
+)
+WINDOWS = {"skinned": SKELETAL, "deformed": DEFORMED}
+
+
+def of_joint(number: int):
+    return lambda tensor: torch.full_like(tensor, number)
+
+
+def with_column_missing(tensor: torch.Tensor) -> torch.Tensor:
+    return tensor[..., :-1].contiguous()
+
+
+FALSE = {
+    "a joint of 2³⁰": ("skinned", "skin_joints", of_joint(2**30)),
+    "one too many": ("skinned", "skin_joints", of_joint(len(SKELETAL.motion.names))),
+    "a joint of −1": ("skinned", "skin_joints", of_joint(-1)),
+    "a caster's joint": ("skinned", "caster_joints", of_joint(-(2**30))),
+    "wide joints": ("skinned", "skin_joints", torch.Tensor.long),
+    "joints with parts": ("skinned", "skin_joints", torch.Tensor.float),
+    "a sphere too few": ("skinned", "caster_weights", lambda tensor: tensor[1:].contiguous()),
+    "not a number": ("skinned", "skin_logits", lambda tensor: tensor * torch.nan),
+    "wide numbers": ("deformed", "means", torch.Tensor.double),
+    "a shallow plane": ("deformed", "grid.xy0", with_column_missing),
+} | {
+    f"a narrow {name}": (kind, name, with_column_missing)
+    for kind, model in WINDOWS.items()
+    for name, tensor in {**model.gaussians, **model.shared}.items()
+    if tensor.dim() > 1
+}
+
+
+@pytest.mark.parametrize("false", FALSE)
+def test_tensors_that_are_not_their_motions_are_refused_before_a_kernel_reads_them(tmp_path, false):
+    """Kernels look at no bounds: the number of a joint that is not there ended the process."""
+    kind, name, change = FALSE[false]
+    file = tmp_path / "w.safetensors"
+    save_window(file, WINDOWS[kind])
+    assert len(load_window(file)) == len(WINDOWS[kind])
+    tensors, about = load_tensors(file)
+    (stored,) = [known for known in tensors if known.partition(".")[2] == name]
+    tensors[stored] = change(tensors[stored])
+    save_tensors(file, tensors, about)
+    with pytest.raises(ModelError, match=f"does not hold a window of a body: .*'?{name[:6]}"):
+        load_window(file)
+
+
+def deformed(**changes) -> dict:
+    own = {"middle": [0, 0, 0], "half": [1, 1, 1], "mlp": {"inputs": 4}, "encoder": None}
+    return own | {"bands": 0} | changes
+
+
+HUGE = {
+    "bands": ("deformation", deformed(bands=10**8)),
+    "bands for a wide MLP": ("deformation", deformed(bands=10**8, mlp={"inputs": 4 + 8 * 10**8})),
+    "depth": ("deformation", deformed(mlp={"inputs": 4, "depth": 10**8})),
+    "scales": ("deformation", deformed(encoder={"space": [2] * 10**6, "time": 1, "channels": 1})),
+    "degree": ("polynomial", {"degree": 10**9, "turning": False, "detached": False}),
+    "joints": (
+        "skinned",
+        {"names": [str(n) for n in range(10**5)], "parents": [*range(-1, 10**5 - 1)]}
+        | {"frames": 1, "shapes": 0, "hidden": 0, "light": False},
+    ),
+}
+
+
+@pytest.mark.parametrize("huge", HUGE)
+def test_a_description_builds_nothing_that_its_file_does_not_hold(tmp_path, huge):
+    """A file of 1 kB took 8.5 GB."""
+    kind, fields = HUGE[huge]
+    file = tmp_path / "w.safetensors"
+    names = {f"gaussians.{name}": tensor for name, tensor in canonical(2).items()}
+    names |= {"gaussians.alpha": torch.zeros(2, 2)}
+    for layer in range(3):
+        names |= {f"shared.mlp.{part}{layer}": torch.zeros(1) for part in ("weight", "bias")}
+    save_tensors(file, names, {"kind": kind, **fields})
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModelError, match="does not hold a window of a body"):
+            load_window(file)
+        assert tracemalloc.get_traced_memory()[1] < 200e6
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"frames": 1.5},
+        {"frames": 0},
+        {"shapes": -1},
+        {"hidden": 10**9},
+        {"names": [1] * 5},
+        {"names": ["a"] * 5},
+        {"parents": "abcde"},
+        {"parents": [-1, 1, 2, 3, 4]},
+        {"parents": [4, 3, 2, 1, 0]},
+        {"parents": [-1, 0, 3 * 10**9, 0, 0]},
+    ],
+)
+def test_a_skeleton_that_is_none_is_refused(tmp_path, changes):
+    file = tmp_path / "w.safetensors"
+    save_window(file, SKELETAL)
+    tensors, about = load_tensors(file)
+    save_tensors(file, tensors, about | changes)
+    with pytest.raises(ModelError, match="does not hold a window of a body"):
+        load_window(file)

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import torch
 
+from ico3d.body.checking import check_window
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.opening import motion_from
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import Method
 from ico3d.common.files import json_of, write_atomic
-from ico3d.errors import ModelError
+from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
 
@@ -49,10 +50,12 @@ def load_window(file: Path) -> WindowModel:
             part, _, rest = name.partition(".")
             parts[part][rest] = tensor
         motion, shared = motion_from(about), parts["shared"]
+        model = WindowModel(motion, parts["gaussians"], shared, colors)
+        check_window(model)
         one = {name: tensor[:1] for name, tensor in parts["gaussians"].items()}
         WindowModel(motion, one, shared).at(0.0)  # better refused here than where it is drawn
-        return WindowModel(motion, parts["gaussians"], shared, colors)
-    except DAMAGED as error:
+        return model
+    except (SettingsError, *DAMAGED) as error:
         raise ModelError(f"{file} does not hold a window of a body: {error}.") from error
 
 

@@ -26,8 +26,9 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.losses import tensor_psnr
 from ico3d.splat.render import render
 from ico3d.training.acceleration import accelerated
+from ico3d.training.checkpoint import check_shapes
 from ico3d.training.epochs import Epochs
-from ico3d.training.optimiser import Optimiser
+from ico3d.training.optimiser import Optimiser, check_moments
 
 CPU = torch.device("cpu")
 GEOMETRY = ("means", "quats", "log_scales")
@@ -183,6 +184,7 @@ class HeadTrainer:
 
         Raises:
             SettingsError: If the head poses have changed: the Gaussians would lie in another space.
+            ValueError, KeyError: If the tensors are of another head.
         """
         if state.get("space") != self._space():
             raise SettingsError(
@@ -190,12 +192,30 @@ class HeadTrainer:
                 "poses have changed since: train in an empty folder."
             )
         self._loss.go_on(state.get("perceptual_weight", self.settings.loss.perceptual))
-        self.model.resize(tensors["model.means"].shape[0])
-        self.model.load_state_dict(_below("model.", tensors))
+        own, moments = _below("model.", tensors), _below("moments.", tensors)
+        shape, count = self.model.shape, len(own["means"])
+        check_shapes(lambda: HeadModel(shape, count), own)
+        self.model.resize(count)
+        self.model.load_state_dict(own)
         if self.adaptor is not None:
             self.adaptor.restore(_below("adaptor.", tensors))
-        self._optimiser.moments = _below("moments.", tensors)
+        check_moments(moments, self._trained(), self._basis_moments())
+        self._optimiser.moments = moments
         self._density.restore(_below("density.", tensors))
+
+    def _basis_moments(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of the basis's moments that are its own (`update_basis`)."""
+        rows, count, _ = self.model.basis.shape
+        own: dict[str, tuple[int, ...]] = {"basis.steps": (rows,)}
+        rmsprop = self._settings.basis_optimiser == "rmsprop"
+        return own | ({"basis.second": (rows, count)} if rmsprop else {})
+
+    def _trained(self) -> dict[str, Tensor]:
+        """All parameters, by the names that the optimiser has for them."""
+        named = dict(self.model.named_parameters())
+        if self.adaptor is not None:
+            named |= {f"adaptor.{name}": p for name, p in self.adaptor.named_parameters()}
+        return named
 
     def _space(self) -> dict:
         """What weights and places in the folder's checkpoint are relative to."""

@@ -37,6 +37,8 @@ class StaticScene:
         for name, shape in shapes.items():
             if parameters[name].shape != (count, *shape):
                 raise ValueError(f"{name} of {count} Gaussians must have shape {(count, *shape)}")
+            if parameters[name].dtype != torch.float32:
+                raise ValueError(f"{name} must be float32, not {parameters[name].dtype}")
         harmonics.degree_of(1 + rest[0])
         self.parameters = parameters
 

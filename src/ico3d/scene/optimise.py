@@ -24,7 +24,7 @@ from ico3d.splat.losses import photometric, tensor_psnr
 from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
 from ico3d.training.epochs import Epochs
-from ico3d.training.optimiser import Optimiser
+from ico3d.training.optimiser import Optimiser, check_moments
 
 CLONE_BELOW = 0.01
 PRUNE_ABOVE = 0.1
@@ -122,13 +122,21 @@ class SceneTrainer:
         return {}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Restores what `tensors` returned."""
+        """Restores what `tensors` returned.
+
+        Raises:
+            ValueError, KeyError: If they are of no such scene.
+        """
         del state
         parts: dict[str, dict[str, Tensor]] = {"scene": {}, "moments": {}, "density": {}}
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
             parts[part][rest] = tensor
+        degree = self.scene.degree
         self.scene = StaticScene({n: t.requires_grad_() for n, t in parts["scene"].items()})
+        if self.scene.degree != degree:
+            raise ValueError(f"its harmonics are of degree {self.scene.degree}, not {degree}")
+        check_moments(parts["moments"], self.scene.parameters)
         self._optimiser.moments = parts["moments"]
         self._strategy.restore(parts["density"])
 

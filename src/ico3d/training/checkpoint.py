@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import loose_json
 from ico3d.errors import ModelError
+from ico3d.training.finite import all_finite
 
 DTYPES = {
     torch.float64: "F64",
@@ -39,6 +40,8 @@ DAMAGED = (
     RuntimeError,
 )
 """What reading values out of a model's JSON and tensors raises where they are damaged."""
+Size = tuple[int | None, ...]
+"""The shape that a tensor must have; None is any number."""
 ALIGNMENT = 8
 """The header of a safetensors file ends at a multiple of this many bytes."""
 SEAL = "sha256"
@@ -194,6 +197,32 @@ def check_shapes(build: Callable[[], nn.Module], tensors: Mapping[str, Tensor]) 
             raise ValueError(
                 f"'{name}' has the shape {found.get(name)}, expected {wanted.get(name)}"
             )
+
+
+def check_tensor(name: str, tensor: Tensor, size: Size, below: int | None = None) -> None:
+    """Checks one tensor of a file: kernels read it without looking at its bounds.
+
+    Args:
+        name: Its name.
+        tensor: The tensor.
+        size: Its shape.
+        below: What its numbers are smaller than, and then they are int32 and not negative; None
+            for float32, all finite.
+
+    Raises:
+        ValueError: If it is something else.
+    """
+    kind = torch.float32 if below is None else torch.int32
+    found = tuple(tensor.shape)
+    fits = len(found) == len(size) and all(w in (None, n) for n, w in zip(found, size, strict=True))
+    if tensor.dtype != kind or not fits:
+        text = ", ".join("…" if n is None else str(n) for n in size)
+        raise ValueError(f"'{name}' is {tensor.dtype} of {found}, expected {kind} of ({text})")
+    if below is None:
+        if not all_finite(tensor):
+            raise ValueError(f"'{name}' holds NaN or infinity")
+    elif tensor.numel() and not 0 <= int(tensor.min()) <= int(tensor.max()) < below:
+        raise ValueError(f"'{name}' holds a number that is not from 0 to {below - 1}")
 
 
 @contextmanager

@@ -37,7 +37,7 @@ def check_gradient(name: str, gradient: Tensor) -> None:
     Raises:
         NotFiniteError: If the gradient holds NaN or infinity.
     """
-    if not _is_finite(gradient):
+    if not all_finite(gradient):
         raise NotFiniteError(f"the gradient of '{name}'")
 
 
@@ -48,11 +48,14 @@ def check_finite(tensors: Mapping[str, Tensor]) -> None:
         NotFiniteError: At the first tensor that holds NaN or infinity.
     """
     for name, tensor in tensors.items():
-        if tensor.is_floating_point() and not _is_finite(tensor):
+        if tensor.is_floating_point() and not all_finite(tensor):
             raise NotFiniteError(f"'{name}'")
 
 
-def _is_finite(tensor: Tensor) -> bool:
-    """A sum tells in a thirtieth of the time, unless it overflows by itself."""
+def all_finite(tensor: Tensor) -> bool:
+    """Whether a tensor holds neither NaN nor infinity.
+
+    A sum tells in a thirtieth of the time, unless it overflows by itself.
+    """
     total = tensor.detach().sum()
     return math.isfinite(total.item()) or bool(torch.isfinite(tensor).all())

@@ -11,11 +11,15 @@ import torch
 from torch import Tensor
 
 from ico3d.common.files import full_disk
+from ico3d.errors import ModelError
 from ico3d.training.checkpoint import placed
 from ico3d.training.devices import device_failure
 from ico3d.training.finite import NotFiniteError, check_finite
 from ico3d.training.log import MetricsLog, progress_bar, readable
 from ico3d.training.run import RunFolder, checkpoint_state
+
+UNFIT = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError)
+"""What restoring raises where a checkpoint does not fit; what a GPU raises is none of it."""
 
 
 class Trainee(Protocol):
@@ -150,8 +154,14 @@ def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:
     if checkpoint is None:
         return 0, 0.0
     tensors, state = checkpoint
-    trainee.restore(placed(tensors, trainee.place), state["trainee"])
-    return state["step"], state["seconds"]
+    try:
+        trainee.restore(placed(tensors, trainee.place), state["trainee"])
+        return state["step"], float(state["seconds"])
+    except UNFIT as error:
+        raise ModelError(
+            f"the checkpoint in {run.path} is of another training ({error}): choose another "
+            "folder, or remove it to start afresh."
+        ) from error
 
 
 def saved_steps(folder: Path) -> int:

@@ -6,6 +6,7 @@ to be a single pass through memory.
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import torch
@@ -19,6 +20,8 @@ BETA1 = 0.9
 BETA2 = 0.999
 EPSILON = 1e-15
 """Adam's ε as in 3D Gaussian splatting: gradients of positions are far below the usual 1e-8."""
+KINDS = ("first", "second", "steps", "mean")
+"""What the names of moments end with; `mean` is the mean over the last steps."""
 BLOCK = 4096
 """Numbers that a thread updates as one block."""
 
@@ -77,6 +80,39 @@ class Optimiser:
         steps += 1
         first, second = self.moments[f"{name}.first"], self.moments[f"{name}.second"]
         return first, second, bias_corrections(int(steps))
+
+
+def check_moments(
+    moments: Mapping[str, Tensor],
+    parameters: Mapping[str, Tensor],
+    others: Mapping[str, tuple[int, ...]] = {},
+) -> None:
+    """Checks the moments of a checkpoint, which kernels write to as far as the parameter reaches.
+
+    Args:
+        moments: The moments by name.
+        parameters: The parameters that go on with them, by name.
+        others: Shapes of the moments that are not as `Optimiser` makes them, by name.
+
+    Raises:
+        ValueError: If one is of another type or shape than its parameter, or of none.
+    """
+    for name, moment in moments.items():
+        owner, _, kind = name.rpartition(".")
+        if owner not in parameters or kind not in KINDS:
+            raise ValueError(f"there is no parameter of which '{name}' is a moment")
+        counts, value = kind == "steps", parameters[owner]
+        dtype = torch.int64 if counts else value.dtype
+        shape = others.get(name, () if counts else tuple(value.shape))
+        if (moment.dtype, tuple(moment.shape)) != (dtype, shape):
+            found = tuple(moment.shape)
+            raise ValueError(f"'{name}' is {moment.dtype} of {found}, expected {dtype} of {shape}")
+        if counts and moment.numel() and int(moment.min()) < 0:
+            raise ValueError(f"'{name}' counts fewer than no steps")
+        needed = {"first": ("second", "steps"), "second": ("steps",)}.get(kind, ())
+        for other in (f"{owner}.{part}" for part in needed):
+            if other not in moments:
+                raise ValueError(f"'{name}' has no '{other}' beside it")
 
 
 def bias_corrections(steps: int) -> tuple[np.float32, np.float32]:

@@ -149,7 +149,7 @@ def test_weights_begin_as_those_of_a_linear_layer_and_small_at_the_end():
 
 
 def test_a_layer_without_values_is_refused():
-    with pytest.raises(SettingsError, match="at least 1"):
+    with pytest.raises(SettingsError, match="1 to 1,024"):
         MlpShape(inputs=16, sets=0)
 
 

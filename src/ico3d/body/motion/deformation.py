@@ -15,8 +15,11 @@ from ico3d.body.motion.encoder import (
 )
 from ico3d.body.motion.tunable import MlpShape, initial_weights, positional_encoding, tunable_mlp
 from ico3d.body.motion.window_model import activated
+from ico3d.errors import SettingsError
 from ico3d.splat.gaussians import Gaussians
 
+POSITIONS, DELTAS = 4, 10
+"""Number of values that the positional encoding takes (x, y, z and time), and of the MLP's."""
 GRID, MLP = "grid.", "mlp."
 """Prefixes of the names of shared tensors: planes of the encoder, and weights of the MLP."""
 
@@ -41,6 +44,17 @@ class Deformation:
     mlp: MlpShape
     encoder: EncoderShape | None
     bands: int
+
+    def __post_init__(self):
+        """Checks that encoding, MLP and what is moved fit one another.
+
+        Raises:
+            SettingsError: If they do not.
+        """
+        encoded = POSITIONS * (1 + 2 * self.bands)
+        inputs = encoded if self.encoder is None else self.encoder.outputs
+        if (self.mlp.inputs, self.mlp.outputs) != (inputs, DELTAS):
+            raise SettingsError(f"An MLP of {self.mlp} does not take {inputs} to {DELTAS} values.")
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:

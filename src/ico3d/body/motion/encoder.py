@@ -22,6 +22,8 @@ TIME_PLANES = ("xt", "yt", "zt")
 """The planes of time: columns are positions along x, y or z, rows are times."""
 SPACE_RANGE = (0.1, 0.5)
 """Range of the initial random values of space planes; time planes begin at 1: nothing moves."""
+MOST_SCALES = 16
+"""Largest number of scales."""
 SUMS = 4
 """Number of parts of the points; gradients are summed within each part, by one thread."""
 
@@ -44,8 +46,10 @@ class EncoderShape:
         """Checks the sizes.
 
         Raises:
-            SettingsError: If a plane would be empty.
+            SettingsError: If a plane would be empty, or there are more than `MOST_SCALES`.
         """
+        if len(self.space) > MOST_SCALES:
+            raise SettingsError(f"An encoder has at most {MOST_SCALES} scales.")
         if not self.space or min(self.space) < 2 or self.time < 1 or self.channels < 1:
             raise SettingsError(
                 f"An encoder of {self.space} places, {self.time} times and {self.channels} "

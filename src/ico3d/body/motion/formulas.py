@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from torch import Tensor
 
 from ico3d.body.motion.window_model import activated
+from ico3d.errors import SettingsError
 from ico3d.splat.gaussians import Gaussians
 
 
@@ -33,6 +34,10 @@ class Still:
         return {"kind": "still"}
 
 
+MOST_DEGREE = 8
+"""Largest degree of a polynomial."""
+
+
 @dataclass(frozen=True)
 class Polynomial:
     """A `Motion` by polynomials: each Gaussian has a time at which it is most opaque.
@@ -50,6 +55,15 @@ class Polynomial:
     degree: int
     turning: bool
     detached: bool
+
+    def __post_init__(self):
+        """Checks the degree.
+
+        Raises:
+            SettingsError: If it is not 1 to `MOST_DEGREE`.
+        """
+        if not 1 <= self.degree <= MOST_DEGREE:
+            raise SettingsError(f"A polynomial's degree must be 1 to {MOST_DEGREE}.")
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:

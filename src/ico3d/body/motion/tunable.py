@@ -17,6 +17,8 @@ from ico3d.body.motion.tunable_kernels import BLOCK, padded
 from ico3d.errors import SettingsError
 from ico3d.splat.cpu.compile import PARTS
 
+MOST = 1024
+"""Largest number of inputs, layers, values of a layer, and sets of weights."""
 OUTPUT_GAIN = 0.1
 """Factor of the last layer's initial weights, so that Gaussians hardly move at first."""
 
@@ -43,10 +45,11 @@ class MlpShape:
         """Checks the sizes.
 
         Raises:
-            SettingsError: If a size is below 1.
+            SettingsError: If a size is below 1 or above `MOST`.
         """
-        if min(self.inputs, self.width, self.depth, self.outputs, self.sets) < 1:
-            raise SettingsError(f"Every size of a tunable MLP must be at least 1: {self}.")
+        sizes = (self.inputs, self.width, self.depth, self.outputs, self.sets)
+        if min(sizes) < 1 or max(sizes) > MOST:
+            raise SettingsError(f"Every size of a tunable MLP must be 1 to {MOST:,}: {self}.")
 
     @property
     def layers(self) -> list[tuple[int, int]]:

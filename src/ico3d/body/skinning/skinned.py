@@ -13,6 +13,7 @@ from ico3d.body.skinning.blending import Posed, blended
 from ico3d.body.skinning.kinematics import transforms
 from ico3d.body.skinning.light import lamp_lit, lit
 from ico3d.body.skinning.shadow import posed_casters, reached
+from ico3d.errors import SettingsError
 from ico3d.rig import quaternions
 from ico3d.splat.gaussians import Gaussians
 
@@ -71,6 +72,18 @@ class Skinned:
     hidden: int
     light: bool
     shadow: bool = False
+
+    def __post_init__(self):
+        """Checks the numbers.
+
+        Raises:
+            SettingsError: If there are no frames, fewer than 0 shapes, or a network without values.
+        """
+        if self.frames < 1 or self.shapes < 0 or self.hidden < min(self.shapes, 1):
+            raise SettingsError(
+                f"A motion of {self.frames} frames, {self.shapes} shapes and a hidden layer of "
+                f"{self.hidden} values does not exist."
+            )
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:

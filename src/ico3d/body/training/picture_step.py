@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from ico3d.body import camera_colors
+from ico3d.body.checking import check_window
 from ico3d.body.companion import Companion, Pruning
 from ico3d.body.motion.deformation import GRID, MLP
 from ico3d.body.motion.window_model import WindowModel
@@ -22,7 +23,7 @@ from ico3d.splat.losses import l1, photometric
 from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
 from ico3d.training.epochs import Epochs
-from ico3d.training.optimiser import Optimiser
+from ico3d.training.optimiser import Optimiser, check_moments
 
 
 class Learner:
@@ -153,9 +154,8 @@ class Learner:
             progress: Share of the steps that are done, 0 to 1, for the decay of learning rates.
         """
         maps = self.model.camera_colors
-        tensors = {**self.model.gaussians, **self.model.shared, "camera_colors": maps}
-        for name, tensor in tensors.items():
-            if tensor is None or tensor.grad is None:
+        for name, tensor in self._trained().items():
+            if tensor.grad is None:
                 continue
             rate = self._rates[_group(name)].at(progress)
             if name == "means":
@@ -168,6 +168,12 @@ class Learner:
             tensor.grad = None
         if maps is not None and maps.requires_grad:
             camera_colors.center(maps, self._cameras)
+
+    def _trained(self) -> dict[str, Tensor]:
+        """All tensors that the optimiser may know, by the names that it has for them."""
+        maps = self.model.camera_colors
+        named = {**self.model.gaussians, **self.model.shared}
+        return named if maps is None else named | {"camera_colors": maps}
 
     @torch.no_grad()
     def keep_mean(self, count: int) -> None:
@@ -193,18 +199,25 @@ class Learner:
         return named if maps is None else named | {"camera_colors": maps}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
-        """Restores the state that `tensors` returned; the same tensors require gradients."""
+        """Restores the state that `tensors` returned; the same tensors require gradients.
+
+        Raises:
+            ValueError, KeyError: If they are of another window.
+        """
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
             if part == "moments":
                 self.optimiser.moments[rest] = tensor
             elif part == "camera_colors":
-                assert self.model.camera_colors is not None
+                if self.model.camera_colors is None or len(tensor) != len(self.model.camera_colors):
+                    raise ValueError("it has colours of other cameras")
                 learns = self.model.camera_colors.requires_grad
                 self.model.camera_colors = tensor.requires_grad_(learns)
             elif part in ("gaussians", "shared"):
                 held = self.model.gaussians if part == "gaussians" else self.model.shared
                 held[rest] = tensor.requires_grad_(held[rest].requires_grad)
+        check_window(self.model)
+        check_moments(self.optimiser.moments, self._trained())
 
 
 class WindowTrainee:

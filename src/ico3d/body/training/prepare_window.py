@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from ico3d.body.companion import Companion, Pruning
-from ico3d.body.motion.deformation import Deformation
+from ico3d.body.motion.deformation import POSITIONS, Deformation
 from ico3d.body.motion.encoder import EncoderShape
 from ico3d.body.motion.formulas import FREETIME, SPACETIME, Polynomial, Still
 from ico3d.body.motion.tunable import MlpShape
@@ -28,8 +28,6 @@ PADDING = 0.15
 
 Positions outside of the box all have the encoder's features at its border.
 """
-POSITIONS = 4
-"""Number of values that the positional encoding takes: x, y, z and time."""
 
 
 Dynamic = Callable[[np.ndarray], np.ndarray]

@@ -58,6 +58,15 @@ class DensityStats:
     gradient_sum: Tensor
     views: Tensor
 
+    def __post_init__(self):
+        """Checks the shapes, which may come from a checkpoint.
+
+        Raises:
+            ValueError: If they differ.
+        """
+        if self.views.dim() != 1 or self.gradient_sum.shape != self.views.shape:
+            raise ValueError("gradients and views of Gaussians differ in number")
+
     @staticmethod
     def zeros(count: int, device: torch.device | str = "cpu") -> "DensityStats":
         """Empty statistics for `count` Gaussians."""
