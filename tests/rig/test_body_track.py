@@ -1,6 +1,7 @@
 """The file of a body track: round trip, and what is refused."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -93,6 +94,8 @@ def damaged(track, tmp_path, arrays=(), **about):
         ("roots", np.full((5, 3), 1e6, np.float32), "farther than"),
         ("faces", np.array([[0, 1, 4]], np.int32), "vertex that is not there"),
         ("vertex_joints", np.full((4, 4), 2, np.uint8), "joint that is not there"),
+        ("vertex_joints", np.full((4, 4), -(2**30)), "must be uint8"),
+        ("faces", np.full((1, 3), 0.5), "must be int32"),
         ("vertex_weights", np.full((4, 4), 0.5, np.float32), "sum to 1"),
         ("joints", np.full((2, 3), 50.0), "more than 10 m"),
     ],
@@ -105,7 +108,17 @@ def test_impossible_values_are_refused(track, tmp_path, name, value, why):
 
 @pytest.mark.parametrize(
     "about",
-    [{"parents": [0, 0]}, {"names": ["a", "a"]}, {"version": 2}, {"fps": "fast"}, {"fps": 10**400}],
+    [
+        {"parents": [0, 0]},
+        {"parents": [math.inf, 0]},
+        {"names": ["a", "a"]},
+        {"names": 5},
+        {"version": 2},
+        {"fps": "fast"},
+        {"fps": []},
+        {"fps": 10**400},
+    ],
+    ids=lambda about: f"{about}"[:20],
 )
 def test_wrong_rigs_are_refused(track, tmp_path, about):
     damaged(track, tmp_path, **about)

@@ -116,7 +116,9 @@ def test_checkpoints_of_earlier_versions_are_taken(died):
 
 
 @pytest.mark.parametrize("name", ["settings.json", "finished.json"])
-@pytest.mark.parametrize("content", [b"", b'{"a', b"[]", b"\xff\x00", b"[" * 200_000])
+@pytest.mark.parametrize(
+    "content", [b"", b'{"a', b"[]", b"\xff\x00", b"[" * 200_000], ids=lambda text: text[:4]
+)
 def test_other_damaged_files_of_a_run_are_one_sentence(died, name, content):
     (died / name).write_bytes(content)
     with pytest.raises(ModelError, match=rf"{name} is damaged: put a copy of it there"):

@@ -20,6 +20,8 @@ NAME = "body_track.safetensors"
 """Name of the file in a recording's folder."""
 VERSION = 1
 """Version of the file."""
+NUMBERS = {"faces": np.dtype(np.int32), "vertex_joints": np.dtype(np.uint8)}
+"""Types of the arrays of indices."""
 LONGEST = 1e3
 """Largest coordinate of roots and vertices in metres that a file may hold."""
 
@@ -221,6 +223,9 @@ def _check_values(arrays: dict[str, np.ndarray], joints: int, vertices: int) -> 
     for name in ("roots", "vertices"):
         if np.abs(arrays[name]).max(initial=0) > LONGEST:
             raise ValueError(f"'{name}' reaches farther than {LONGEST:g} m")
+    for name, kind in NUMBERS.items():
+        if arrays[name].dtype != kind:
+            raise ValueError(f"'{name}' must be {kind}, found {arrays[name].dtype}")
     faces, weights = arrays["faces"], arrays["vertex_weights"]
     if faces.size and not (faces.min() >= 0 and faces.max() < vertices):
         raise ValueError("'faces' names a vertex that is not there")

@@ -9,10 +9,14 @@ import torch
 from ico3d.body.settings import settings_for
 from ico3d.body.training.picture_step import Learner
 from ico3d.body.training.views import BodyViews
+from ico3d.errors import ModelError
 from ico3d.splat.losses import ssim
 from ico3d.splat.render import render
+from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.run import BEFORE, RunFolder
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import WINDOW, trainer_of
+from support.bodies.tracked_capture import TrackedCapture
 
 
 @pytest.fixture
@@ -180,3 +184,35 @@ def test_epochs_show_every_view_once(capture):
         == {id(v) for v in learner.views}
     )
     assert seen[:count] != seen[count:]
+
+
+FOREIGN = {
+    "gaussians.skin_joints": lambda tensor: torch.full_like(tensor, 2**30),
+    "gaussians.means": lambda tensor: tensor[:, :1].contiguous(),
+    "shared.pose_rotations": lambda tensor: tensor[:1].contiguous(),
+    "moments.means.first": lambda tensor: tensor[:1].contiguous(),
+    "moments.means.second": torch.Tensor.double,
+    "moments.means.steps": lambda tensor: tensor - 100,
+    "camera_colors": lambda tensor: tensor[:1].contiguous(),
+    "density.views": lambda tensor: torch.zeros(7),
+}
+
+
+def test_a_checkpoint_of_other_tensors_is_refused_before_a_kernel_writes_to_them(tmp_path):
+    """The optimiser's kernel writes to moments as far as their parameter reaches."""
+    capture = TrackedCapture(tmp_path / "capture")
+    trainer = trainer_of(capture, "skinned", color_correction=True)
+    trainer.step(0)
+    honest = {name: tensor.detach().clone() for name, tensor in trainer.tensors().items()}
+    state = {"step": 1, "seconds": 1.0, "trainee": {}}
+    run = RunFolder(tmp_path / "run", {})
+    steps = LoopSettings(steps=1)
+    for name, change in FOREIGN.items():
+        run.save_checkpoint(honest | {name: change(honest[name])}, state)
+        (run.path / BEFORE).unlink(missing_ok=True)
+        resumed = trainer_of(capture, "skinned", color_correction=True)
+        with pytest.raises(ModelError, match="is of another training"):
+            run_loop(resumed, run, steps)
+    run.save_checkpoint(honest, state)
+    run_loop(resumed, run, steps)
+    assert all(torch.equal(honest[name], tensor) for name, tensor in resumed.tensors().items())
