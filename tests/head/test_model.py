@@ -147,9 +147,9 @@ def test_a_file_of_something_else_is_one_sentence(tmp_path):
 @pytest.mark.parametrize(
     ("field", "value", "named"),
     [
-        ("hidden", 10**8, "color_branch"),
-        ("features", 10**9, "basis"),
-        ("expression_size", 10**9, "basis"),
+        ("hidden", 8000, "color_branch"),
+        ("features", 8000, "basis"),
+        ("expression_size", 8000, "basis"),
     ],
 )
 def test_what_a_file_describes_is_compared_before_it_is_built(tmp_path, field, value, named):
@@ -158,6 +158,26 @@ def test_what_a_file_describes_is_compared_before_it_is_built(tmp_path, field, v
     tensors, state = load_tensors(file)
     save_tensors(file, tensors, {"shape": state["shape"] | {field: value}})
     with pytest.raises(ModelError, match=rf"does not hold a head model: .*'{named}.* expected"):
+        HeadModel.load(file)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"hidden": 10**9},
+        {"frequencies": 10**8, "hidden": 0},
+        {"features": 0},
+        {"features": 2.0},
+        {"expression_size": -1},
+    ],
+)
+def test_sizes_that_no_head_has_are_refused(tmp_path, changes):
+    """An MLP without values has no weights, however much it reads: only a limit tells."""
+    file = tmp_path / "model.safetensors"
+    HeadModel(head_shape(2, features=4, hidden=3, frequencies=1), 3).save(file)
+    tensors, state = load_tensors(file)
+    save_tensors(file, tensors, {"shape": state["shape"] | changes})
+    with pytest.raises(ModelError, match=r"does not hold a head model: .*A head's"):
         HeadModel.load(file)
 
 

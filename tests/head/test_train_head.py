@@ -14,8 +14,9 @@ from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head, trainer_of
 from ico3d.splat.render import render
-from ico3d.training.checkpoint import load_tensors
+from ico3d.training.checkpoint import load_sealed, load_tensors, save_sealed
 from ico3d.training.finite import check_finite
+from ico3d.training.run import CHECKPOINT
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
@@ -89,6 +90,27 @@ def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkey
     if inputs == "speech":
         for name, value in whole.adaptor.state_dict().items():
             assert torch.equal(resumed.adaptor.state_dict()[name], value), name
+
+
+@pytest.mark.parametrize("rows", ["adam", "rmsprop"])
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("model.means", lambda tensor: tensor[:, :1].contiguous()),
+        ("moments.basis.second", lambda tensor: tensor[:, :1].contiguous()),
+        ("moments.basis.steps", lambda tensor: tensor[:1].contiguous()),
+        ("moments.means.first", lambda tensor: tensor[:1].contiguous()),
+    ],
+)
+def test_a_checkpoint_of_other_tensors_is_refused(tiny, tmp_path, monkeypatch, rows, name, change):
+    """The optimiser's kernels write to moments as far as their parameter reaches."""
+    job = _job(steps=6, checkpoint_every=2, basis_optimiser=rows)
+    _train_until(3, monkeypatch, tiny, tmp_path / "head", job)
+    file = tmp_path / "head" / CHECKPOINT
+    tensors, state = load_sealed(file)
+    save_sealed(file, tensors | {name: change(tensors[name])}, state)
+    with pytest.raises(ModelError, match="is of another training"):
+        train_head(tiny, tmp_path / "head", job)
 
 
 def test_a_run_and_its_head_know_their_space(tiny, tmp_path, monkeypatch):

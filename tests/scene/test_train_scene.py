@@ -12,6 +12,8 @@ from ico3d.scene.optimise import SceneTrainer
 from ico3d.scene.settings import settings_for
 from ico3d.scene.train_scene import SceneJob, train_scene
 from ico3d.splat.files.formats import read_gaussians
+from ico3d.training.checkpoint import load_sealed, save_sealed
+from ico3d.training.run import CHECKPOINT
 from support.captures import open_with
 from support.settings import changed
 
@@ -79,6 +81,35 @@ def test_a_killed_run_resumes_to_the_same_scene(still, tmp_path, preset, strateg
         assert torch.equal(resumed.scene.parameters[name], value), name
     made = TrainedScene.load(tmp_path / "parts").summary["made"]
     assert made["used"] == {"optimiser": "adam", "sh_degree": 3 if preset == "paper" else 1}
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("scene.means", torch.Tensor.double),
+        ("scene.quats", lambda tensor: tensor[:, :3].contiguous()),
+        ("moments.means.first", lambda tensor: tensor[:1].contiguous()),
+        ("density.views", lambda tensor: tensor[:1].contiguous()),
+    ],
+)
+def test_a_checkpoint_of_other_tensors_is_refused(still, tmp_path, monkeypatch, name, change):
+    """The optimiser's kernels write to moments as far as their parameter reaches."""
+    capture, job = still(3), _job(steps=4, checkpoint_every=2)
+    step = SceneTrainer.step
+
+    def dying_step(self, index):
+        if index == 3:
+            raise KeyboardInterrupt
+        return step(self, index)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(SceneTrainer, "step", dying_step)
+        train_scene(capture, tmp_path / "scene", job)
+    file = tmp_path / "scene" / CHECKPOINT
+    tensors, state = load_sealed(file)
+    save_sealed(file, tensors | {name: change(tensors[name])}, state)
+    with pytest.raises(ModelError, match="is of another training"):
+        train_scene(capture, tmp_path / "scene", job)
 
 
 def test_a_saved_scene_is_the_same(still, tmp_path):

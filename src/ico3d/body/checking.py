@@ -84,13 +84,13 @@ def _shared(motion: Motion) -> dict[str, Size]:
     if not isinstance(motion, Skinned):
         return {}
     joints, frames = len(motion.names), motion.frames
-    network = {
+    network: dict[str, Size] = {
         "weight0": (3 * joints, motion.hidden),
         "bias0": (motion.hidden,),
         "weight1": (motion.hidden, motion.shapes),
         "bias1": (motion.shapes,),
     }
-    return {
+    skeleton: dict[str, Size] = {
         "rig_joints": (joints, 3),
         "pose_rotations": (frames, joints, 4),
         "pose_roots": (frames, 3),
@@ -100,7 +100,8 @@ def _shared(motion: Motion) -> dict[str, Size]:
         "caster_points": (None, 3),
         "caster_joints": (None, INFLUENCES),
         "caster_weights": (None, INFLUENCES),
-    } | {NETWORK + name: size for name, size in network.items()}
+    }
+    return skeleton | {NETWORK + name: size for name, size in network.items()}
 
 
 def _limits(motion: Motion) -> dict[str, int]:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from ico3d.common.expression import TURN_SIZE
-from ico3d.errors import ModelError
+from ico3d.errors import ModelError, SettingsError
 from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
 from ico3d.head.portrait.neck import Neck
@@ -21,6 +21,8 @@ from ico3d.training.checkpoint import DAMAGED, check_shapes, load_tensors, save_
 Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
 INITIAL_OPACITY = 0.1
+MOST = 8192
+"""Largest size of an expression, of the MLP and of what it reads."""
 
 GAUSSIAN_AXES = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
 """What is learnt per Gaussian, with the axis along which the Gaussians lie."""
@@ -61,6 +63,18 @@ class HeadShape:
     turns: bool = False
     relit: bool = False
     neck: Neck | None = None
+
+    def __post_init__(self):
+        """Checks the sizes, of which a file of a few bytes can name any.
+
+        Raises:
+            SettingsError: If one is below its least or above `MOST`.
+        """
+        least = {"expression_size": 0, "features": 1, "hidden": 1, "frequencies": 0}
+        for name, fewest in least.items():
+            value = getattr(self, name)
+            if type(value) is not int or not fewest <= value <= MOST:
+                raise SettingsError(f"A head's {name} is {fewest} to {MOST:,}, not {value!r:.40}.")
 
     @property
     def outputs(self) -> int:
@@ -287,7 +301,7 @@ class HeadModel(nn.Module):
             check_shapes(lambda: cls(shape, count), tensors)
             model = cls(shape, count)
             model.load_state_dict(tensors)
-        except DAMAGED as error:
+        except (SettingsError, *DAMAGED) as error:
             raise ModelError(
                 f"{path} does not hold a head model: {json.dumps(str(error))}."
             ) from error

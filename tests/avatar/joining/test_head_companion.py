@@ -23,6 +23,9 @@ def placement(abroad):
     return Placement(ABROAD, head_poses(abroad))
 
 
+NAN = torch.full((4, 3), torch.nan)
+
+
 @pytest.fixture
 def source(head, abroad, placement, tmp_path):
     """An avatar's folder with all but its body."""
@@ -47,6 +50,15 @@ def test_the_head_is_where_it_was_recorded(source, abroad):
             if name != "quats":  # q and −q are one rotation
                 torch.testing.assert_close(value, getattr(truth, name), rtol=1e-4, atol=1e-5)
         assert companion.gaussians(frame) is drawn
+
+
+@pytest.mark.parametrize(
+    "seam", [{}, {"seam": torch.zeros(3)}, {"seam": torch.zeros(3, 2)}, {"seam": NAN}], ids=str
+)
+def test_a_file_without_a_seam_is_refused(source, seam):
+    save_tensors(source.folder / SEAM, seam, {})
+    with pytest.raises(ModelError, match=r"seam\.safetensors holds no positions"):
+        source.open(CPU)
 
 
 def test_places_are_forbidden_in_the_world(source, placement):

@@ -15,6 +15,7 @@ from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import load_tensors
+from ico3d.training.finite import all_finite
 
 SEAM = "seam.safetensors"
 """File with positions (P, 3) near the head's border, in the space of the head's model."""
@@ -44,7 +45,7 @@ class HeadSource:
         """
         head = TrainedHead.load(self.folder / HEAD)
         placement, expressions = load_placement(self.folder / PLACEMENT)
-        seam = load_tensors(self.folder / SEAM)[0]["seam"].numpy()  # (P, 3)
+        seam = _seam(self.folder / SEAM)
         head.model.to(device)
         return HeadCompanion(head, placement, expressions, seam, self)
 
@@ -61,6 +62,18 @@ class HeadSource:
             digest.update(file.read_bytes())
         settings = {"border_points": self.border_points, "pruning": self.pruning}
         return settings | {"head": digest.hexdigest()}
+
+
+def _seam(file: Path) -> np.ndarray:
+    """(P, 3) positions near the head's border.
+
+    Raises:
+        ModelError: If the file holds something else.
+    """
+    seam = load_tensors(file)[0].get("seam", torch.empty(0))
+    if seam.dim() != 2 or seam.shape[1] != 3 or not all_finite(seam):
+        raise ModelError(f"{file} holds no positions (P, 3): assemble the avatar again.")
+    return seam.numpy()
 
 
 class HeadCompanion:
