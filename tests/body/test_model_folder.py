@@ -1,6 +1,7 @@
 """Bodies on disk."""
 
 import json
+import math
 
 import pytest
 import torch
@@ -99,6 +100,27 @@ def test_names_that_no_file_can_have(body, tmp_path, named):
     about["windows"][0]["file"] = named
     (tmp_path / ABOUT).write_text(json.dumps(about))
     with pytest.raises(ModelError):
+        TrainedBody.load(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"fps": 0},
+        {"fps": math.nan},
+        {"fps": 10**400},
+        {"windows": []},
+        {"windows": [{"first": 4, "last": 2, "file": "0.safetensors"}]},
+        {"method": "levitation"},
+        {"method": []},
+        {"summary": []},
+    ],
+    ids=lambda changes: f"{changes}"[:30],
+)
+def test_what_no_body_tells_of_itself_is_refused(body, tmp_path, changes):
+    about = json.loads((tmp_path / ABOUT).read_text())
+    (tmp_path / ABOUT).write_text(json.dumps(about | changes))
+    with pytest.raises(ModelError, match="holds no body"):
         TrainedBody.load(tmp_path)
 
 

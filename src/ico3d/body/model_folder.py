@@ -1,9 +1,12 @@
 """A trained body, and the model folder that holds it."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import get_args
 
 import torch
 
@@ -154,6 +157,7 @@ class TrainedBody:
             inside = [file.is_relative_to(folder.resolve()) for file in found]
             fps, method = float(content["fps"]), content["method"]
             summary = content["summary"]
+            _check_told(windows, fps, method, summary)
         except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no body ({error}): train one with ico3d train body."
@@ -164,3 +168,15 @@ class TrainedBody:
         if len(set(found)) < len(found):
             raise ModelError(f"{folder / about} names a file for more than one window.")
         return cls([load_window(file) for file in files], windows, fps, method, summary)
+
+
+def _check_told(windows: Sequence[Window], fps: float, method: object, summary: object) -> None:
+    """Raises ValueError if what a folder tells of its body is impossible."""
+    if not (math.isfinite(fps) and fps > 0):
+        raise ValueError(f"it has {fps} frames per second")
+    ends = [windows[0].first - 1] + [window.last for window in windows]
+    ordered = all(a < b for a, b in pairwise(ends)) and all(len(window) > 0 for window in windows)
+    if windows[0].first < 0 or not ordered:
+        raise ValueError("its windows do not follow one another")
+    if method not in get_args(Method) or not isinstance(summary, dict):
+        raise ValueError("it has no method or summary")
