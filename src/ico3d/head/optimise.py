@@ -212,7 +212,7 @@ class HeadTrainer:
 
     def _trained(self) -> dict[str, Tensor]:
         """All parameters, by the names that the optimiser has for them."""
-        named = dict(self.model.named_parameters())
+        named: dict[str, Tensor] = dict(self.model.named_parameters())
         if self.adaptor is not None:
             named |= {f"adaptor.{name}": p for name, p in self.adaptor.named_parameters()}
         return named
