@@ -6,7 +6,7 @@ import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence, type Tongue } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
-import { isForOthers } from './keys.ts';
+import { isForOthers } from './keyboard/keys.ts';
 
 const CLICK = 350; // ms; who clicks the button to talk does not know that it is held
 

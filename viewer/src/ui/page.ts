@@ -8,7 +8,7 @@ import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
 import { LineNotice } from './line.ts';
 import { Overlay } from './overlay.ts';
-import { markPressed } from './pressed.ts';
+import { markPressed } from './keyboard/pressed.ts';
 import { Memory } from './sheets/memory.ts';
 import { Panel } from './sheets/panel.ts';
 import { Settings } from './sheets/settings.ts';

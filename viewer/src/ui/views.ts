@@ -3,7 +3,7 @@ import type { Orbit } from '../stage/camera/orbit.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say } from '../words/text.ts';
 import { icon } from './icons.ts';
-import { isForOthers } from './keys.ts';
+import { isForOthers } from './keyboard/keys.ts';
 
 /**
  * A button for each view of somebody; their numbers are keys, wherever nothing is typed.

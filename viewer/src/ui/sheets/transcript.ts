@@ -7,7 +7,7 @@ import { Disclosure } from './disclosure.ts';
 import { keepUp, type TalkStore } from './kept-talk.ts';
 import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
-import { isForOthers } from '../keys.ts';
+import { isForOthers } from '../keyboard/keys.ts';
 
 const TOLD = 4000; // ms for which it says what a button has done
 const END = 40; // pixels from the lower end within which the record follows what is said
