@@ -45,6 +45,20 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
       `${width} ${height}`,
       { timeout: 60_000 },
     );
+    await settled();
+  }
+
+  /** The camera has come to rest: frames, captions and zooming move it, on a busy machine for a while. */
+  async function settled(): Promise<void> {
+    await refreshed(page);
+    await page.evaluate(async () => {
+      const { camera } = window.ico3d!.stage;
+      const place = () => [...camera.matrixWorld.elements, ...camera.projectionMatrix.elements].map((value) => value.toFixed(4)).join();
+      for (let [last, since] = [place(), performance.now()]; performance.now() - since < 1000; ) {
+        await new Promise(requestAnimationFrame);
+        if (place() !== last) [last, since] = [place(), performance.now()];
+      }
+    });
     await refreshed(page);
   }
 
@@ -85,7 +99,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     expect(Math.abs(x - width / height / 2)).toBeLessThan(0.1);
     expect(apart / scale).toBeGreaterThan(0.1); // a face of 22 cm on 80 cm of picture
     expect(Math.min(...tops) / height).toBeGreaterThan(chin);
-    const hair = height > 300 ? 1 : 0.3; // in a small frame buttons lie over the hair
+    const hair = height > 300 ? 1 : 0.1; // in a small frame, with captions of four lines, buttons lie over hair and forehead
     const face = { left: x - apart, right: x + apart, top: y - hair * apart, bottom: chin };
     const over = await page.$$eval('header button', (buttons, [face, height]) => {
       const boxes = buttons.map((button) => button.getBoundingClientRect()).filter(({ width }) => width > 0);
@@ -100,13 +114,13 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     const before = await seeEyes(page);
     await page.mouse.move(before.x * 300, before.y * 300);
     for (let notch = 0; notch < 3; notch++) await page.mouse.wheel(0, -250);
-    await refreshed(page);
+    await settled();
     const after = await seeEyes(page);
     console.log(`eyes ${before.apart.toFixed(3)} wide, then ${after.apart.toFixed(3)}`);
     expect(after.apart / before.apart).toBeGreaterThan(1.8);
     expect(Math.hypot(after.x - before.x, after.y - before.y)).toBeLessThan(0.03);
     for (let notch = 0; notch < 5; notch++) await page.mouse.wheel(0, -250);
-    await refreshed(page);
+    await settled();
     const last = await seeEyes(page);
     expect(last.apart).toBeGreaterThan(0.42); // the face fills the picture
     expect(Math.hypot(last.x - before.x, last.y - before.y)).toBeLessThan(0.06);
@@ -124,11 +138,11 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     await touch('touchStart', -20, 20);
     for (let way = 25; way <= 40; way += 5) await touch('touchMove', -way, way);
     await touch('touchEnd');
-    await refreshed(page);
+    await settled();
     const after = await seeEyes(page);
     expect(after.apart / before.apart).toBeGreaterThan(1.8);
     expect(after.apart / before.apart).toBeLessThan(2.2);
-    expect(Math.hypot(after.x - before.x, after.y - before.y)).toBeLessThan(0.03);
+    expect(Math.hypot(after.x - before.x, after.y - before.y)).toBeLessThan(0.1); // the chin stays above the controls
   });
 
   test('a slash leads to the text box and stays out of it, but not out of a text', async () => {
