@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ico3d.capture.surface import hull as hulls
 from ico3d.capture.surface.hull import Silhouette, focus, looked_at, visual_hull
 from ico3d.common.camera import Camera, look_at
 
@@ -111,3 +112,18 @@ def test_there_is_no_hull_without_cameras_that_look_at_one_place():
     assert visual_hull(_seen([one, parallel]), EDGE) is None
     assert visual_hull(_seen([one]), EDGE) is None
     np.testing.assert_allclose(focus([one, _camera(1.0)]), CENTER, atol=1e-9)
+
+
+def test_where_cameras_show_a_whole_town_voxels_are_as_large_as_the_memory_allows(monkeypatch):
+    monkeypatch.setattr(hulls, "MOST_CELLS", 60)
+    away = _from_center(visual_hull(_seen(_ring()), 1e-6))  # 10¹⁸ voxels
+    assert away.min() > RADIUS - 0.012 and np.median(away) < RADIUS + 0.02
+    monkeypatch.setattr(hulls, "MOST_LOOKS", 12 * 40**3)
+    fewer = _from_center(visual_hull(_seen(_ring()), 1e-6))
+    assert len(fewer) == pytest.approx((40 / 60) ** 2 * len(away), rel=0.1)
+
+
+def test_cameras_that_show_more_than_any_number_look_at_no_place():
+    far = [_camera(turn) for turn in (0.0, 1.5)]
+    wide = np.diag([1e-308, 1e-308, 1.0])
+    assert looked_at([Camera(10**6, 10, wide, camera.world_to_camera) for camera in far]) is None
