@@ -215,7 +215,8 @@ class _Filling:
         pixels, depths = camera.project(centers)  # (V, 2), (V,)
         self._front = depths > 0
         depth = float(np.median(depths[self._front])) if self._front.any() else 1.0
-        side = max(1, math.ceil(edge * float(camera.intrinsics[[0, 1], [0, 1]].max()) / depth))
+        wide = edge * float(camera.intrinsics[[0, 1], [0, 1]].max()) / depth
+        side = max(1, math.ceil(min(wide, max(silhouette.mask.shape))))
         rows, columns = (-(-size // side) for size in silhouette.mask.shape)
         padded = np.zeros((rows * side, columns * side), bool)
         padded[: silhouette.mask.shape[0], : silhouette.mask.shape[1]] = silhouette.mask
