@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -312,8 +313,7 @@ def bundle_in(folder: Path, likeness: str) -> Path:
 def test_a_chain_of_thousands_of_models_takes_seconds_not_days(tmp_path):
     """Each was made of the next one, of which the last one shows somebody."""
     paths = [tmp_path / f"{number:04}" for number in range(3000)]
-    pairs = zip(paths, paths[1:], strict=False)
-    chain = [Holding(path, "a model", (), (origin,)) for path, origin in pairs]
+    chain = [Holding(path, "a model", (), (origin,)) for path, origin in pairwise(paths)]
     holdings = [*chain, Holding(paths[-1], "a model", ("Eve",)), Holding(tmp_path / "b", "", ())]
     begin = time.process_time()
     chosen = belonging(holdings, [], {"eve"})
@@ -324,6 +324,11 @@ def test_a_chain_of_thousands_of_models_takes_seconds_not_days(tmp_path):
 
 
 def test_a_model_of_an_endless_path_is_nobodys(project, capsys):
-    model(project / "models/odd", "head.json", {"capture": {"likeness": "Ada"}}, capture=Path("a" * 300))
+    model(
+        project / "models/odd",
+        "head.json",
+        {"capture": {"likeness": "Ada"}},
+        capture=Path("a" * 300),
+    )
     main(["forget", "Ada", "--project", str(project), "--yes"])
     assert "removed" in capsys.readouterr().out

@@ -197,7 +197,9 @@ class TalkingPortrait(RecordedCapture):
         wanted = [names.index(name) for name in AU_COLUMNS]
         table = _reading(
             path,
-            lambda: np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, usecols=wanted, ndmin=2),
+            lambda: np.loadtxt(
+                text.splitlines(), delimiter=",", skiprows=1, usecols=wanted, ndmin=2
+            ),
         )
         return dict(zip(AU_COLUMNS, table.T, strict=True))
 
