@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import threading
+from datetime import date
 from types import SimpleNamespace
 
 import httpx
@@ -347,7 +348,7 @@ def test_others_need_https(capsys):
 
 async def test_others_are_answered_while_talks_begin(room, monkeypatch):
     for name in ("Ida", "Ada"):
-        _client(room).post(f"/recordings/{name}", json={"agreed": True, "language": "de"})
+        room.people.begin(name, "de", True, date.today())
     begun = threading.Event()
     monkeypatch.setattr(room.talks, "url", lambda _: "there" if begun.wait(20) else "")
     sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
@@ -362,7 +363,7 @@ async def test_others_are_answered_while_talks_begin(room, monkeypatch):
 
 
 async def test_no_talk_begins_of_somebody_who_was_deleted_meanwhile(room, monkeypatch):
-    _client(room).post("/recordings/Ida", json={"agreed": True, "language": "de"})
+    room.people.begin("Ida", "de", True, date.today())
     served: list[str] = []
     monkeypatch.setattr(room.talks, "url", lambda avatar: served.append(avatar.stem) or "there")
     sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
