@@ -25,6 +25,7 @@ CONSTANTS = {
     "SPEECH_RATE": "Hz",
     "EXPRESSION_FPS": "rows per second",
     "RESUME_SECONDS": "",
+    "BEAT_SECONDS": "",
 }
 """What the page uses, with its unit."""
 
