@@ -194,9 +194,9 @@ export class Stage {
     const rooms = this.actors.filter(({ thin }) => thin);
     for (const object of rooms.flatMap(({ objects }) => objects)) object.visible = !through;
     scenery.setShadowAlone(through);
-    const place = presentation ?? (meeting?.stands ? meeting : null);
-    scenery.visible = place !== null;
-    if (place) scenery.stand(place.ground, place.stands);
+    const place = presentation ?? meeting;
+    scenery.visible = meeting !== null;
+    if (place && meeting) scenery.stand(place.ground, meeting.eyes, place.stands);
     const shown = presentation ? through || rooms.length === 0 : !this.transparent && rooms.length === 0;
     if (shown) this.scene.add(scenery);
     else scenery.removeFromParent();
