@@ -362,37 +362,9 @@ export interface ErrorMessage {
   values: Record<string, number>;
 }
 
-export type ClientMessage =
-  | HelloMessage
-  | NotesMessage
-  | AudioMessage
-  | TextMessage
-  | SayMessage
-  | InterruptMessage
-  | ClockMessage
-  | TalkMessage
-  | HeardMessage
-  | DeafMessage;
+export type ClientMessage = HelloMessage | NotesMessage | AudioMessage | TextMessage | SayMessage | InterruptMessage | ClockMessage | TalkMessage | HeardMessage | DeafMessage;
 
-export type ServerMessage =
-  | WelcomeMessage
-  | PlaceMessage
-  | AckMessage
-  | BeatMessage
-  | StateMessage
-  | TranscriptMessage
-  | AnswerMessage
-  | SpokenMessage
-  | SpeechMessage
-  | TimelineMessage
-  | CuesMessage
-  | CallMessage
-  | EndMessage
-  | StopMessage
-  | PauseMessage
-  | ResumeMessage
-  | MetricsMessage
-  | ErrorMessage;
+export type ServerMessage = WelcomeMessage | PlaceMessage | AckMessage | BeatMessage | StateMessage | TranscriptMessage | AnswerMessage | SpokenMessage | SpeechMessage | TimelineMessage | CuesMessage | CallMessage | EndMessage | StopMessage | PauseMessage | ResumeMessage | MetricsMessage | ErrorMessage;
 
 export const SERVER_TYPES = ["welcome", "place", "ack", "beat", "state", "transcript", "answer", "spoken", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
 

@@ -10,8 +10,8 @@ import {
   type WelcomeMessage,
 } from '../protocol.ts';
 import { say, type Sentence } from '../words/text.ts';
-import { Silence } from './silence.ts';
-import { SoundQueue } from './sound-queue.ts';
+import { Silence } from './line/silence.ts';
+import { SoundQueue } from './line/sound-queue.ts';
 import { told } from './told.ts';
 import { decode, encode } from './wire.ts';
 

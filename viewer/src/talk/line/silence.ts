@@ -1,4 +1,4 @@
-import { BEAT_SECONDS } from '../protocol.ts';
+import { BEAT_SECONDS } from '../../protocol.ts';
 
 const LOOK = (1000 * BEAT_SECONDS) / 2; // ms between looks
 const MOST_LOOKS = 8; // four beats that did not come
