@@ -20,13 +20,15 @@ from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 5
+VERSION = 6
 SINCE = {"body": 2, "skinned": 3}
 """Version in which a field appeared; in older manifests that field is read as null."""
 SINCE_CASTERS = 4
 """Version in which a body on a skeleton got `num_casters`; older ones cast no shadow."""
 SINCE_REST = 5
 """Version in which heads and bodies on a skeleton got `num_rest`; older ones are in one file."""
+SINCE_SKY = 6
+"""Version in which a body on a skeleton got `num_sky`; older ones hide no light from themselves."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
@@ -230,6 +232,8 @@ class Manifest:
         missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
         if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
+        if value["version"] < SINCE_SKY and isinstance(value.get("skinned"), dict):
+            value = {**value, "skinned": {"num_sky": 0, **value["skinned"]}}
         value = {**value, "version": VERSION, **dict.fromkeys(missing)}
         if "persona" in value:
             value = {**value, "persona": with_defaults(value["persona"])}

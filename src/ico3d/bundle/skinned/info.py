@@ -39,6 +39,8 @@ class SkinnedInfo:
         num_casters: Number of spheres that cast shadows; 0 without a lamp.
         num_rest: Number of the Gaussians in `body/skinned_rest.safetensors`, the least important
             ones; 0 where all are in one file.
+        num_sky: Number of directions from which light from all around is looked for; 0 where the
+            body hides none of it from itself. Only with casters.
     """
 
     fps: float
@@ -53,6 +55,7 @@ class SkinnedInfo:
     high: tuple[float, float, float]
     num_casters: int = 0
     num_rest: int = 0
+    num_sky: int = 0
 
     @property
     def num_joints(self) -> int:
@@ -88,6 +91,7 @@ def check_skinned(info: SkinnedInfo, require: Require) -> None:
         "num_moving": (1, min(info.num_joints, MOST_JOINTS)),
         "num_casters": (0, limits.MAX_CASTERS),
         "num_rest": (0, info.num_gaussians - 1),
+        "num_sky": (0, limits.MAX_SKY if info.num_casters else 0),
         "num_known": (1, min(info.num_frames, limits.MAX_KNOWN_POSES)),
     }
     for name, (least, most) in ranges.items():
