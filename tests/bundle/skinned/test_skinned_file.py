@@ -66,7 +66,7 @@ def test_sixty_thousand_gaussians_are_under_seven_megabytes():
     baked = random_skinned(60_000, shapes=8, frames=900)
     size = len(baked.to_bytes())
     assert size < 7e6
-    assert size - 60_000 * 96 < 900 * (4 * 8 + 12 + 4 * 8) + 10_000  # 96 bytes per Gaussian
+    assert size - 60_000 * 108 < 900 * (4 * 8 + 12 + 4 * 8) + 10_000  # 108 bytes per Gaussian
 
 
 def test_bodies_of_windows_are_read_as_before():
