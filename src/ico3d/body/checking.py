@@ -120,7 +120,7 @@ def _check_skeleton(motion: Skinned, model: WindowModel) -> None:
     Rig(motion.names, motion.parents, model.shared["rig_joints"].detach().cpu().double().numpy())
     casters = [tensor for name, tensor in model.shared.items() if name.startswith("caster_")]
     if len({len(tensor) for tensor in casters}) > 1:
-        raise ValueError("tensors of the spheres differ in number")
+        raise ValueError("casters differ in number")
 
 
 def _check_box(motion: Deformation) -> None:

@@ -124,13 +124,17 @@ def regressed(seen: Seen) -> Lighting:
     """The light by which colours of points change least, once it is taken off them.
 
     Weighted least squares in logits, each point with a colour of its own. Directions are tried one
-    by one, and finer about the best.
+    by one, and finer about the best, from which the search goes on while a neighbour is better.
     """
     regression = _Regression(seen)
     found = min(map(regression.tried, _all_around()), key=lambda one: one[0])
     for degrees in FINER:
-        around = [regression.tried(way) for way in _ring(found[1], degrees)]
-        found = min(found, *around, key=lambda one: one[0])
+        better = True
+        while better:
+            around = [regression.tried(way) for way in _ring(found[1], degrees)]
+            nearest = min(around, key=lambda one: one[0])
+            better = nearest[0] < found[0]
+            found = nearest if better else found
     return regression.solved(found[1])
 
 
@@ -158,8 +162,8 @@ class _Regression:
     def tried(self, direction: Tensor) -> tuple[float, Tensor]:
         """What a lamp in a direction (3,) leaves unexplained, and that direction."""
         reach = self._seen.reach(direction)  # (T, P)
-        left = [self._unexplained(direction, reach, k).sum() for k in COARSE]
-        return float(torch.stack(left).min()), direction
+        left = torch.stack([self._unexplained(direction, reach, k) for k in COARSE])  # (S, 3)
+        return float(left.min(0).values.sum()), direction
 
     def solved(self, direction: Tensor) -> Lighting:
         """The light with a lamp in a direction, each of its colours as strong as fits best."""

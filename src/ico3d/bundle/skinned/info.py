@@ -97,6 +97,7 @@ def check_skinned(info: SkinnedInfo, require: Require) -> None:
     for name, (least, most) in ranges.items():
         inside = least <= getattr(info, name) <= most
         require(inside, f"skinned.{name}", f"lie between {least} and {most}")
+    require(info.num_sky != 1, "skinned.num_sky", "be 0, or at least 2")
     require(0 < info.fps <= 1000, "skinned.fps", "lie between 0 and 1000")
     named = all(0 < len(name) <= LONGEST_NAME for name in info.names)
     require(named, "skinned.names", f"have 1 to {LONGEST_NAME} characters each")
