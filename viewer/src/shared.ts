@@ -28,7 +28,7 @@ export const MAX_CLUSTERS = 256;
 export const MAX_CASTERS = 20000;
 
 /** The map in which a lamp sees a body, in metres; rig/shadow_map.py. */
-export const SHADOW = {"radius": 0.02, "texel": 0.0125, "side": 256, "off": 0.01, "bias": 0.03, "edge": 0.002, "wrap": 0.2} as const;
+export const SHADOW = {"radius": 0.02, "texel": 0.0125, "side": 256, "off": 0.01, "bias": 0.03, "edge": 0.002, "wrap": 0.2, "skyLeast": 0.05} as const;
 
 /** Sentences of earlier visits; chat/wire/protocol_visits.py. */
 export const MAX_NOTES = 16;

@@ -1,62 +1,53 @@
 import { SHADOW } from '../../shared.ts';
-import type { BakedLamp } from './baked.ts';
-import { TABLE_ROW } from './skeleton.ts';
 
-const { radius: RADIUS, texel: TEXEL, side: SIDE } = SHADOW;
+const { radius: RADIUS, texel: TEXEL, side: SIDE, bias: BIAS, edge: EDGE } = SHADOW;
 const REACH = RADIUS / TEXEL;
-const POINT = 1e-4; // metres
 const FAR = -1e9; // where no sphere lies
 
-/** The spheres as the lamp sees them: how far towards it the nearest one reaches, in a map that repeats. */
+/** Spheres as a distant lamp sees them: how far towards it the nearest one reaches, in a map that repeats. */
 export class ShadowMap {
-  readonly depths = new Float32Array(SIDE * SIDE).fill(FAR); // metres
+  readonly depths: Float32Array; // (SIDE,SIDE) metres
   readonly axes: Float64Array; // (3,3) across, up and towards the lamp
-  private readonly lamp: BakedLamp;
-  private readonly seen: Float64Array; // (J,3,4) where joints take their points, by the lamp's axes
-  private readonly rows = new Float64Array(12); // of one sphere
 
-  constructor(lamp: BakedLamp, joints: number) {
-    this.lamp = lamp;
-    this.axes = axes(lamp.direction);
-    this.seen = new Float64Array(12 * joints);
+  /**
+   * @param direction (3,) towards the lamp
+   * @param depths room for the map, which others may draw into as well
+   */
+  constructor(direction: ArrayLike<number>, depths = new Float32Array(SIDE * SIDE)) {
+    this.axes = axes(direction);
+    this.depths = depths;
   }
 
-  /** Draws the spheres as they lie in a pose, whose joint table (J,TABLE_ROW) is given. */
-  draw(table: Float32Array): void {
-    const { points, joints, weights } = this.lamp;
-    const { depths, rows, seen } = this;
-    this.turn(table);
-    depths.fill(FAR);
-    for (let i = 0; i < points.length; i += 3) {
-      rows.fill(0);
-      for (let k = (4 * i) / 3, end = k + 4; k < end; k++) {
-        const weight = weights[k]! / 255;
-        if (weight === 0) continue;
-        for (let c = 0, at = 12 * joints[k]!; c < 12; c++) rows[c]! += weight * seen[at + c]!;
-      }
-      const x = points[i]! * POINT;
-      const y = points[i + 1]! * POINT;
-      const z = points[i + 2]! * POINT;
-      this.sphere(
-        (rows[0]! * x + rows[1]! * y + rows[2]! * z + rows[3]!) / TEXEL,
-        (rows[4]! * x + rows[5]! * y + rows[6]! * z + rows[7]!) / TEXEL,
-        rows[8]! * x + rows[9]! * y + rows[10]! * z + rows[11]!,
-      );
+  /** Draws spheres, whose centres (M,3) are given. */
+  draw(centres: Float64Array): void {
+    const [ax, ay, az, bx, by, bz, cx, cy, cz] = this.axes as unknown as Nine;
+    this.depths.fill(FAR);
+    for (let i = 0; i < centres.length; i += 3) {
+      const x = centres[i]!;
+      const y = centres[i + 1]!;
+      const z = centres[i + 2]!;
+      this.sphere((ax * x + ay * y + az * z) / TEXEL, (bx * x + by * y + bz * z) / TEXEL, cx * x + cy * y + cz * z);
     }
   }
 
-  /** Turns the joints' matrices (R | t) towards the lamp. */
-  private turn(table: Float32Array): void {
-    const { axes, seen } = this;
-    for (let joint = 0; joint < seen.length / 12; joint++) {
-      const from = TABLE_ROW * joint;
-      for (let r = 0; r < 3; r++) {
-        for (let c = 0; c < 4; c++) {
-          const value = axes[3 * r]! * table[from + c]! + axes[3 * r + 1]! * table[from + 4 + c]!;
-          seen[12 * joint + 4 * r + c] = value + axes[3 * r + 2]! * table[from + 8 + c]!;
-        }
+  /** The share of the lamp's light that reaches a place, from the 4 × 4 texels about it. */
+  reach(x: number, y: number, z: number): number {
+    const { axes, depths } = this;
+    const across = (axes[0]! * x + axes[1]! * y + axes[2]! * z) / TEXEL;
+    const up = (axes[3]! * x + axes[4]! * y + axes[5]! * z) / TEXEL;
+    const depth = axes[6]! * x + axes[7]! * y + axes[8]! * z + BIAS;
+    const left = Math.floor(across);
+    const low = Math.floor(up);
+    let share = 0;
+    for (let row = low - 1; row < low + 3; row++) {
+      const line = (row & (SIDE - 1)) * SIDE;
+      const nearY = 1 - 0.5 * Math.abs(up - row);
+      for (let column = left - 1; column < left + 3; column++) {
+        const before = (depth - depths[line + (column & (SIDE - 1))]!) / EDGE + 0.5;
+        if (before > 0) share += nearY * (1 - 0.5 * Math.abs(across - column)) * Math.min(before, 1);
       }
     }
+    return 0.25 * share;
   }
 
   /** Draws a sphere whose centre is at a column and row of the map, and so many metres towards the lamp. */
@@ -75,9 +66,10 @@ export class ShadowMap {
   }
 }
 
-function axes([x, y, z]: Float32Array): Float64Array {
-  const length = Math.hypot(x!, y!, z!);
-  const towards = [x! / length, y! / length, z! / length] as const;
+function axes(direction: ArrayLike<number>): Float64Array {
+  const [x, y, z] = [direction[0]!, direction[1]!, direction[2]!];
+  const length = Math.hypot(x, y, z);
+  const towards = [x / length, y / length, z / length] as const;
   const up = Math.abs(towards[1]) < 0.99 ? ([0, 1, 0] as const) : ([0, 0, 1] as const);
   const side = cross(up, towards);
   const wide = Math.hypot(...side);
@@ -86,6 +78,7 @@ function axes([x, y, z]: Float32Array): Float64Array {
 }
 
 type Triple = readonly [number, number, number];
+type Nine = readonly [number, number, number, number, number, number, number, number, number];
 
 function cross(a: Triple, b: Triple): Triple {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -98,7 +91,7 @@ export const SHADOW_DECLARATIONS = `
 
   float skinnedReach(vec3 place) {
     vec2 at = vec2(dot(place, skinnedLamp[0]), dot(place, skinnedLamp[1])) / ${TEXEL};
-    float depth = dot(place, skinnedLamp[2]) + ${SHADOW.bias};
+    float depth = dot(place, skinnedLamp[2]) + ${BIAS};
     ivec2 corner = ivec2(floor(at));
     vec2 part = at - vec2(corner);
     float share = 0.0;
@@ -106,7 +99,7 @@ export const SHADOW_DECLARATIONS = `
       for (int right = -1; right < 3; right++) {
         float nearest = texelFetch(skinnedShadow, (corner + ivec2(right, down)) & ${SIDE - 1}, 0).r;
         vec2 near = 1.0 - 0.5 * abs(part - vec2(right, down));
-        share += near.x * near.y * clamp((depth - nearest) / ${SHADOW.edge} + 0.5, 0.0, 1.0);
+        share += near.x * near.y * clamp((depth - nearest) / ${EDGE} + 0.5, 0.0, 1.0);
       }
     }
     return 0.25 * share;
