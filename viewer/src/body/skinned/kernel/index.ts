@@ -2,7 +2,7 @@
  * Draws the spheres under the skin as distant lamps see them, and looks up whose light is hidden.
  *
  * All addresses are bytes of this module's memory. The map has `side` rows of `side` texels and of
- * four more, which are the first ones again: so vectors of four need not be split at its edge.
+ * four more, which are the first ones again, so that vectors of four need not be split at its edge.
  */
 
 const FAR: f32 = -1e9; // where no sphere lies
@@ -63,33 +63,40 @@ function along(axis: usize, x: f64, y: f64, z: f64): f64 {
   return load<f64>(axis, 0) * x + load<f64>(axis, 8) * y + load<f64>(axis, 16) * z;
 }
 
-/** Draws a sphere whose centre is at a column and row of the map, and so many metres towards the lamp; it is at most four texels wide. */
+/** Draws a sphere whose centre is at a column and row of the map, and so many metres towards the lamp; it is three or four texels wide. */
 // @ts-ignore: decorator
 @inline
 function sphere(x: f64, y: f64, towards: f64): void {
   const left = ceil<f64>(x - reach);
   const low = ceil<f64>(y - reach);
   const column = map + (<usize>(<i32>left & (side - 1)) << 2);
-  const wide = f64x2.splat(reach * reach);
   const first = f64x2.sub(f64x2(left, left + 1), f64x2.splat(x));
   const second = f64x2.sub(f64x2(left + 2, left + 3), f64x2.splat(x));
+  const wide = f64x2.splat(reach * reach);
   const firstLeft = f64x2.sub(wide, f64x2.mul(first, first));
   const secondLeft = f64x2.sub(wide, f64x2.mul(second, second));
-  for (let row = 0; row < 4; row++) {
-    const down = low + <f64>row - y;
-    const square = f64x2.splat(down * down);
-    const place = column + stride * <usize>((<i32>low + row) & (side - 1));
-    const depths = v128.shuffle<f32>(depth(f64x2.sub(firstLeft, square), towards), depth(f64x2.sub(secondLeft, square), towards), 0, 1, 4, 5);
-    v128.store(place, f32x4.pmax(v128.load(place), depths));
-  }
+  const line = <i32>low;
+  chord(column, line, low - y, firstLeft, secondLeft, towards);
+  chord(column, line + 1, low + 1 - y, firstLeft, secondLeft, towards);
+  chord(column, line + 2, low + 2 - y, firstLeft, secondLeft, towards);
+  if (low + 3 <= y + reach) chord(column, line + 3, low + 3 - y, firstLeft, secondLeft, towards);
 }
 
-/** How far the sphere reaches where its squared radius leaves so much, texels²: two f32. */
+/** Draws a row of a sphere, so many texels above its centre; what is left of its squared radius is given for four columns. */
+// @ts-ignore: decorator
+@inline
+function chord(column: usize, row: i32, up: f64, first: v128, second: v128, towards: f64): void {
+  const place = column + stride * <usize>(row & (side - 1));
+  const square = f64x2.splat(up * up);
+  const depths = v128.shuffle<f32>(depth(f64x2.sub(first, square), towards), depth(f64x2.sub(second, square), towards), 0, 1, 4, 5);
+  v128.store(place, f32x4.pmax(v128.load(place), depths)); // what is no number stays behind
+}
+
+/** How far a sphere reaches where its squared radius leaves so much, texels²: two f32, no numbers outside of it. */
 // @ts-ignore: decorator
 @inline
 function depth(left: v128, towards: f64): v128 {
-  const high = f64x2.add(f64x2.splat(towards), f64x2.mul(f64x2.splat(texel), f64x2.sqrt(left)));
-  return f32x4.demote_f64x2_zero(v128.bitselect(high, f64x2.splat(FAR), f64x2.ge(left, f64x2.splat(0))));
+  return f32x4.demote_f64x2_zero(f64x2.add(f64x2.splat(towards), f64x2.mul(f64x2.splat(texel), f64x2.sqrt(left))));
 }
 
 /**
@@ -122,18 +129,23 @@ function lit(across: f64, up: f64, towards: f64): f64 {
   const left = floor<f64>(across);
   const low = floor<f64>(up);
   const column = map + (<usize>((<i32>left - 1) & (side - 1)) << 2);
-  const partX = <f32>(across - left);
-  const partY = <f32>(up - low);
+  const line = <i32>low;
+  const above = <f32>(up - low);
   const deep = f32x4.splat(<f32>towards);
-  let share = f32x4.splat(0);
-  for (let row = -1; row < 3; row++) {
-    const nearest = v128.load(column + stride * <usize>((<i32>low + row) & (side - 1)));
-    const before = f32x4.add(f32x4.mul(f32x4.sub(deep, nearest), f32x4.splat(steep)), f32x4.splat(HALF));
-    const near = f32x4.splat(ONE - HALF * abs<f32>(partY - <f32>row));
-    share = f32x4.add(share, f32x4.mul(near, f32x4.max(f32x4.min(before, f32x4.splat(1)), f32x4.splat(0))));
-  }
-  const aside = f32x4.abs(f32x4.sub(f32x4.splat(partX), f32x4(-1, 0, 1, 2)));
+  let share = row(column, line - 1, HALF - HALF * above, deep);
+  share = f32x4.add(share, row(column, line, ONE - HALF * above, deep));
+  share = f32x4.add(share, row(column, line + 1, HALF + HALF * above, deep));
+  share = f32x4.add(share, row(column, line + 2, HALF * above, deep));
+  const aside = f32x4.abs(f32x4.sub(f32x4.splat(<f32>(across - left)), f32x4(-1, 0, 1, 2)));
   const by = f32x4.mul(share, f32x4.sub(f32x4.splat(1), f32x4.mul(f32x4.splat(HALF), aside)));
-  const sum = f32x4.extract_lane(by, 0) + f32x4.extract_lane(by, 1) + f32x4.extract_lane(by, 2) + f32x4.extract_lane(by, 3);
-  return <f64>(<f32>0.25 * sum);
+  return <f64>(<f32>0.25 * (f32x4.extract_lane(by, 0) + f32x4.extract_lane(by, 1) + f32x4.extract_lane(by, 2) + f32x4.extract_lane(by, 3)));
+}
+
+/** The light that passes four texels of a row, which counts so much. */
+// @ts-ignore: decorator
+@inline
+function row(column: usize, line: i32, near: f32, deep: v128): v128 {
+  const nearest = v128.load(column + stride * <usize>(line & (side - 1)));
+  const before = f32x4.add(f32x4.mul(f32x4.sub(deep, nearest), f32x4.splat(steep)), f32x4.splat(HALF));
+  return f32x4.mul(f32x4.splat(near), f32x4.pmax(f32x4.splat(0), f32x4.pmin(f32x4.splat(1), before)));
 }
