@@ -57,9 +57,12 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
 
   describe.each(SIZES.flatMap((size) => [false, true].map((headsets) => [...size, headsets] as const)))('of %i × %i, headsets: %s', (width, height, headsets) => {
     beforeAll(async () => {
+      await offerHeadsets(headsets); // before: what changes later than a second after the size leaves her where she is
       await page.setViewportSize({ width, height });
-      await offerHeadsets(headsets);
-      await page.waitForFunction((width) => document.querySelector<HTMLCanvasElement>('#stage')!.width === width, width);
+      await page.waitForFunction(([width, height]) => {
+        const stage = document.querySelector<HTMLCanvasElement>('#stage')!;
+        return stage.width === width && stage.height === height;
+      }, [width, height]);
       await refreshed(page);
     });
 
@@ -103,12 +106,13 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       ['what asks the visitor', '#memory-ask'],
       ['that the sound was interrupted', '#silenced'],
     ])('%s', (_, what) => {
-      beforeAll(() =>
-        page.evaluate(([what, text]) => {
+      beforeAll(async () => {
+        await page.evaluate(([what, text]) => {
           if (what === '#notices p') document.getElementById('notices')!.append(Object.assign(document.createElement('p'), { textContent: text }));
           else document.querySelector<HTMLElement>(what)!.hidden = false;
-        }, [what, NOTICE] as const),
-      );
+        }, [what, NOTICE] as const);
+        await refreshed(page);
+      });
 
       afterAll(() =>
         page.evaluate((what) => {

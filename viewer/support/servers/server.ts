@@ -1,8 +1,7 @@
 import { spawn, type ChildProcess } from 'node:child_process';
 import { once } from 'node:events';
+import { PATIENCE } from '../patience.ts';
 import { ENVIRONMENT, PYTHON, REPOSITORY } from '../python.ts';
-
-const START_TIMEOUT = 60_000; // ms
 
 /** `ico3d serve` with a bundle, or `ico3d studio` with a folder, on a free port of this machine. */
 export class ChatServer {
@@ -54,7 +53,7 @@ export class ChatServer {
 function readUrl(child: ChildProcess): Promise<string> {
   return new Promise((resolve, reject) => {
     let printed = '';
-    const timer = setTimeout(() => reject(new Error(`ico3d serve does not start: ${printed}`)), START_TIMEOUT);
+    const timer = setTimeout(() => reject(new Error(`ico3d serve does not start: ${printed}`)), PATIENCE);
     child.stdout!.on('data', (chunk: Buffer) => {
       printed += chunk.toString();
       const url = /https?:\/\/\S+\//.exec(printed)?.[0];
