@@ -6,7 +6,7 @@ import type { RigPose } from '../src/gesture/placement.ts';
 import { Rig } from '../src/rig/rig.ts';
 import type { Browser } from '../support/browser/browser.ts';
 import { finished, openPage, until } from '../support/browser/talk.ts';
-import { runPython } from '../support/python.ts';
+import { runFork } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 
@@ -33,7 +33,7 @@ let names: string[];
 
 beforeAll(async () => {
   const folder = scratchFolder();
-  runPython('references/gestures/acting_person.py', folder);
+  runFork('references/gestures/acting_person.py', folder);
   server = await ChatServer.start(join(folder, 'person.ico3d'));
   browser = await openPage(server.url);
   page = browser.page;

@@ -4,7 +4,7 @@ import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { drawn, enter, plugIn, seen } from '../support/browser/headset.ts';
 import { drawnBy } from '../support/browser/path.ts';
-import { runPython } from '../support/python.ts';
+import { runFork, runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { servePage } from '../support/servers/static.ts';
 
@@ -71,7 +71,7 @@ describe('somebody on a skeleton, met by headset', () => {
 
   beforeAll(async () => {
     const folder = scratchFolder();
-    runPython('references/gestures/acting_person.py', folder);
+    runFork('references/gestures/acting_person.py', folder);
     const served = await servePage(join(folder, 'bundle'));
     close = served.close;
     browser = await open(served.url);

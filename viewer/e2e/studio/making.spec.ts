@@ -1,4 +1,4 @@
-import { copyFileSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { afterAll, afterEach, beforeAll, beforeEach, expect, inject, test } from 'vitest';
 import { judge } from '../../support/browser/axe.ts';
@@ -10,16 +10,18 @@ import { ChatServer } from '../../support/servers/server.ts';
 
 const folder = scratchFolder();
 const person = join(folder, 'Ida');
-const grey = join(scratchFolder(), 'grey.mp4');
+const recorded = scratchFolder();
+const grey = join(recorded, 'grey.mp4');
 const { demo } = inject('shared');
 let server: ChatServer;
 let browser: Browser;
 let page: Browser['page'];
 
 beforeAll(async () => {
-  server = await ChatServer.tracking(folder, MODELS);
+  runPython('studio/recorded.py', recorded, 'Ida', grey);
+  server = await ChatServer.tracking(folder, MODELS, '--voice');
 });
-beforeEach(() => void runPython('studio/recorded.py', folder, 'Ida', grey));
+beforeEach(() => cpSync(join(recorded, 'Ida'), person, { recursive: true }));
 afterEach(async () => {
   await browser.close();
   rmSync(person, { recursive: true, force: true });
@@ -247,4 +249,26 @@ test('a tab on somebody who was deleted elsewhere says so by itself, and a new r
   );
   expect(await page.evaluate(() => document.activeElement?.id)).toBe('name');
   expect(page.url()).not.toContain('Ida');
+});
+
+test('a voice is agreed to by a tick of its own, off at first, in the language of the page', async () => {
+  browser = await Browser.launch({ width: 390, height: 844 });
+  page = browser.page;
+  await page.goto(server.url);
+  await page.waitForSelector('#voice-tick:visible');
+  expect(await page.isChecked('#voice')).toBe(false);
+  await judge(page, 'studio voice');
+  await page.selectOption('#language', 'de');
+  await expect.poll(() => page.textContent('#voice-sentence')).toMatch(/^Ich bin auch einverstanden, .* meiner Stimme/);
+  for (const [name, ticks] of [['Una', ['#agreed', '#voice']], ['Ada', ['#agreed']]] as const) {
+    await page.fill('#name', name);
+    for (const tick of ticks) await page.check(tick);
+    await page.click('#begin');
+    await page.waitForSelector('#room:visible');
+    const consent = JSON.parse(readFileSync(join(folder, name, 'consent.json'), 'utf8')) as Record<string, string>;
+    expect('voice_consent' in consent).toBe(name === 'Una');
+    expect((await page.textContent('#text'))!.includes('Stimme')).toBe(name === 'Una');
+    await page.click('#back');
+    await page.waitForSelector('#start:visible');
+  }
 });

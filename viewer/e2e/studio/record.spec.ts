@@ -59,6 +59,7 @@ const meterOf = (row: number) => browser.page.$$eval('#meters > dd > meter', (me
 test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything deleted', async () => {
   const page = await open();
   await page.waitForSelector('#start:visible');
+  expect(await page.isVisible('#voice-tick')).toBe(false); // nobody is asked here
   await page.fill('#name', 'Ida');
   await page.click('#begin');
   expect(existsSync(join(folder, 'Ida'))).toBe(false); // not ticked yet
@@ -169,38 +170,6 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   expect(await again.textContent('#problem')).toBe('Everything of Ida is gone.');
 });
 
-test.skipIf(!demo)('a voice is agreed to by a tick of its own, off at first, in the language of the page', async () => {
-  const page = await open();
-  await page.waitForSelector('#start:visible');
-  expect(await page.isVisible('#voice-tick')).toBe(false); // nobody is asked here
-  await browser.close();
-  const own = join(scratchFolder(), 'voices');
-  const asking = await ChatServer.studio(own, 0, '--voice');
-  try {
-    browser = await Browser.launch({ width: 390, height: 844 });
-    const { page } = browser;
-    await page.goto(asking.url);
-    await page.waitForSelector('#voice-tick:visible');
-    expect(await page.isChecked('#voice')).toBe(false);
-    await judge(page, 'studio voice');
-    await page.selectOption('#language', 'de');
-    await expect.poll(() => page.textContent('#voice-sentence')).toMatch(/^Ich bin auch einverstanden, .* meiner Stimme/);
-    for (const [name, ticks] of [['Ida', ['#agreed', '#voice']], ['Ada', ['#agreed']]] as const) {
-      await page.fill('#name', name);
-      for (const tick of ticks) await page.check(tick);
-      await page.click('#begin');
-      await page.waitForSelector('#room:visible');
-      const consent = JSON.parse(readFileSync(join(own, name, 'consent.json'), 'utf8')) as Record<string, string>;
-      expect('voice_consent' in consent).toBe(name === 'Ida');
-      expect((await page.textContent('#text'))!.includes('Stimme')).toBe(name === 'Ida');
-      await page.click('#back');
-      await page.waitForSelector('#start:visible');
-    }
-  } finally {
-    await asking.stop();
-  }
-});
-
 test.skipIf(!demo)('who leaves while it records, and who was deleted in another tab', async () => {
   const page = await open();
   await page.fill('#name', 'Eva');
@@ -235,28 +204,25 @@ test.skipIf(!demo)('who leaves while it records, and who was deleted in another 
 });
 
 test.skipIf(!demo)('a disk that fills up while it records is told, and what has arrived can be kept', async () => {
-  const own = join(scratchFolder(), 'full');
-  const full = await ChatServer.limited(own, 150_000);
+  const page = await open();
+  await page.fill('#name', 'Ina');
+  await page.check('#agreed');
+  await page.click('#begin');
+  await page.click('#open');
+  server.limit(150_000);
   try {
-    browser = await Browser.launch({ width: 1280, height: 800, microphone: voice, camera });
-    const { page } = browser;
-    await page.goto(full.url);
-    await page.fill('#name', 'Ida');
-    await page.check('#agreed');
-    await page.click('#begin');
-    await page.click('#open');
     await page.click('#record');
     await page.waitForSelector('#problem:visible');
-    expect(await page.textContent('#problem')).toMatch(/^The disk is full: free some space and go on\. What was recorded is kept\.$/);
-    await reached('consent', 'broken');
-    const [part] = readdirSync(join(own, 'Ida', 'parts'));
-    expect(statSync(join(own, 'Ida', 'parts', part!)).size).toBeGreaterThan(10_000);
-    await page.click('#salvage');
-    await reached('consent', 'kept');
-    expect(await page.isEnabled('[data-part=text-1]')).toBe(true);
   } finally {
-    await full.stop();
+    server.limit('unlimited');
   }
+  expect(await page.textContent('#problem')).toMatch(/^The disk is full: free some space and go on\. What was recorded is kept\.$/);
+  await reached('consent', 'broken');
+  const [part] = readdirSync(join(folder, 'Ina', 'parts'));
+  expect(statSync(join(folder, 'Ina', 'parts', part!)).size).toBeGreaterThan(10_000);
+  await page.click('#salvage');
+  await reached('consent', 'kept');
+  expect(await page.isEnabled('[data-part=text-1]')).toBe(true);
 });
 
 test.skipIf(!demo)('a camera that is not given, and a server that is gone, are told', async () => {

@@ -1,4 +1,4 @@
-import { spawn, type ChildProcess } from 'node:child_process';
+import { execFileSync, spawn, type ChildProcess } from 'node:child_process';
 import { once } from 'node:events';
 import { PATIENCE } from '../patience.ts';
 import { ENVIRONMENT, PYTHON, REPOSITORY } from '../python.ts';
@@ -18,25 +18,24 @@ export class ChatServer {
     return ChatServer.run(['serve', bundle, '--port', String(port), ...more]);
   }
 
-  /** @param folder where the recordings are @param more arguments of `ico3d studio` */
-  static studio(folder: string, port = 0, ...more: string[]): Promise<ChatServer> {
-    return ChatServer.run(['studio', folder, '--port', String(port), '--no-browser', ...more]);
+  /** @param folder where the recordings are */
+  static studio(folder: string): Promise<ChatServer> {
+    return ChatServer.run(['studio', folder, '--port', '0', '--no-browser']);
   }
 
-  /** `ico3d studio` with a folder, which tracks faces by the models in another one. */
-  static tracking(folder: string, models: string): Promise<ChatServer> {
-    return ChatServer.run(['studio', folder, '--port', '0', '--no-browser'], [], { ...ENVIRONMENT, ICO3D_MODELS: models });
+  /** `ico3d studio` with a folder, which tracks faces by the models in another one, with more arguments. */
+  static tracking(folder: string, models: string, ...more: string[]): Promise<ChatServer> {
+    return ChatServer.run(['studio', folder, '--port', '0', '--no-browser', ...more], { ...ENVIRONMENT, ICO3D_MODELS: models });
   }
 
-  /** `ico3d studio` with a folder, whose files the system lets grow to so many bytes, as on a full disk. */
-  static limited(folder: string, bytes: number): Promise<ChatServer> {
-    return ChatServer.run(['studio', folder, '--port', '0', '--no-browser'], ['prlimit', `--fsize=${bytes}`]);
-  }
-
-  private static async run(words: string[], before: string[] = [], env: NodeJS.ProcessEnv = ENVIRONMENT): Promise<ChatServer> {
-    const [program, ...args] = [...before, PYTHON, '-m', 'ico3d.cli', ...words];
-    const child = spawn(program!, args, { cwd: REPOSITORY, env, stdio: ['ignore', 'pipe', 'inherit'] });
+  private static async run(words: string[], env: NodeJS.ProcessEnv = ENVIRONMENT): Promise<ChatServer> {
+    const child = spawn(PYTHON, ['-m', 'ico3d.cli', ...words], { cwd: REPOSITORY, env, stdio: ['ignore', 'pipe', 'inherit'] });
     return new ChatServer(child, await readUrl(child));
+  }
+
+  /** From now on the system lets its files grow to so many bytes, as on a full disk. */
+  limit(bytes: number | 'unlimited'): void {
+    execFileSync('prlimit', ['--pid', String(this.child.pid), `--fsize=${bytes}:`]); // the soft limit, which can be lifted
   }
 
   /** Ends it without a word, as the system does that has no memory left. */
