@@ -42,7 +42,7 @@ export default defineConfig({
     isolate: false, // loading three and Spark anew for each file takes longer than most of the tests
     testTimeout: 3 * PATIENCE,
     hookTimeout: 3 * PATIENCE,
-    expect: { poll: { timeout: PATIENCE } },
+    expect: { poll: { timeout: PATIENCE, interval: 100 } },
     projects: [
       { extends: true, test: { name: 'unit', include: ['test/**/*.test.ts'] } },
       {

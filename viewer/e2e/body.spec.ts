@@ -38,7 +38,7 @@ let page: Page;
 
 beforeAll(async () => {
   server = await ChatServer.start(reference.file);
-  browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
+  browser = await Browser.launch({ width: WIDTH, height: HEIGHT, hertz: 60 });
   page = await browser.open(drawnBy('webgl', server.url));
 });
 

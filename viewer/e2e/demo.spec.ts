@@ -20,7 +20,7 @@ describe.skipIf(!demoUrl)('the packaged demo (needs src/ico3d/chat/data/demo.ico
     await page.keyboard.press('Escape'); // the greeting is known
     await page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null);
     await page.waitForTimeout(1000);
-    await watchMouth(page);
+    await watchMouth(page, 1200); // a large head: each picture takes a quarter of a second
     await page.fill('#text', 'Who are you?');
     await page.keyboard.press('Enter');
     const { received, loudness } = await until(browser, finished(1));

@@ -244,23 +244,6 @@ test('the floating one shows the question and four lines of the answer', async (
   await browser.close();
 });
 
-test('an inline one begins light or dark, as it goes on, and as the visitor’s system is', async () => {
-  const { browser, page } = await visit('/french');
-  const avatar = page.locator('ico3d-avatar').first();
-  const theme = () => avatar.locator('#page').getAttribute('data-theme');
-  const veil = () => avatar.locator('#overlay').evaluate((overlay) => getComputedStyle(overlay).backgroundColor.match(/[\d.]+/g)!.map(Number)[0]!);
-  await avatar.locator('#choices').waitFor();
-  expect([await theme(), (await veil()) > 200]).toEqual(['light', true]);
-  await page.emulateMedia({ colorScheme: 'dark' });
-  await expect.poll(theme).toBe('dark');
-  expect(await veil()).toBeLessThan(60);
-  await page.emulateMedia({ colorScheme: 'light' });
-  await avatar.locator('#start-typing').click();
-  await heard(page, 'ready');
-  expect(await theme()).toBe('light');
-  await browser.close();
-});
-
 test('around a transparent one the page is seen, through the edges of Gaussians too', async () => {
   const { browser, page } = await visit('/clear');
   await heard(page, 'ready');
@@ -356,21 +339,41 @@ test('an avatar alone shows the face and speaks the sound that it is given', asy
   await browser.close();
 });
 
-test('axe finds nothing serious in an avatar that speaks the language its site gives it', async () => {
-  const { browser, page } = await visit('/french');
-  const avatar = page.locator('ico3d-avatar').first();
-  await avatar.locator('#choices').waitFor();
-  expect(await avatar.locator('#start').textContent()).toBe('Commencer à parler');
-  expect(await avatar.locator('#page').getAttribute('lang')).toBe('fr');
-  expect(await page.locator('#launcher').last().getAttribute('aria-label')).toBe('Talk with the avatar');
-  await judge(page, 'embedded-invitation');
-  await avatar.locator('#start-typing').click();
-  await avatar.locator('#drawer-button').click();
-  await avatar.locator('#record .avatar').waitFor();
-  expect(await avatar.locator('#state').textContent()).toMatch(/^(Parle|Prêt)$/);
-  await page.evaluate(() => (document.querySelector('ico3d-avatar')!.lang = 'ja'));
-  expect(await avatar.locator('#drawer h2').textContent()).toBe('会話の記録');
-  expect(await page.evaluate(() => document.documentElement.lang)).toBe('de'); // the site's own
-  await judge(page, 'embedded');
-  await browser.close();
+describe('an inline one in the language that its site gives it', () => {
+  let browser: Browser;
+  let page: Page;
+  const avatar = () => page.locator('ico3d-avatar').first();
+  const theme = () => avatar().locator('#page').getAttribute('data-theme');
+  beforeAll(async () => {
+    ({ browser, page } = await visit('/french'));
+    await avatar().locator('#choices').waitFor();
+  });
+  afterAll(() => browser?.close());
+
+  test('begins light or dark, as the visitor’s system is', async () => {
+    const veil = () => avatar().locator('#overlay').evaluate((overlay) => getComputedStyle(overlay).backgroundColor.match(/[\d.]+/g)!.map(Number)[0]!);
+    expect([await theme(), (await veil()) > 200]).toEqual(['light', true]);
+    await page.emulateMedia({ colorScheme: 'dark' });
+    await expect.poll(theme).toBe('dark');
+    expect(await veil()).toBeLessThan(60);
+    await page.emulateMedia({ colorScheme: 'light' });
+    await expect.poll(theme).toBe('light');
+  });
+
+  test('goes on as it began, and axe finds nothing serious', async () => {
+    expect(await avatar().locator('#start').textContent()).toBe('Commencer à parler');
+    expect(await avatar().locator('#page').getAttribute('lang')).toBe('fr');
+    expect(await page.locator('#launcher').last().getAttribute('aria-label')).toBe('Talk with the avatar');
+    await judge(page, 'embedded-invitation');
+    await avatar().locator('#start-typing').click();
+    await heard(page, 'ready');
+    expect(await theme()).toBe('light');
+    await avatar().locator('#drawer-button').click();
+    await avatar().locator('#record .avatar').waitFor();
+    expect(await avatar().locator('#state').textContent()).toMatch(/^(Parle|Prêt)$/);
+    await page.evaluate(() => (document.querySelector('ico3d-avatar')!.lang = 'ja'));
+    expect(await avatar().locator('#drawer h2').textContent()).toBe('会話の記録');
+    expect(await page.evaluate(() => document.documentElement.lang)).toBe('de'); // the site's own
+    await judge(page, 'embedded');
+  });
 });
