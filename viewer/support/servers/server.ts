@@ -1,7 +1,6 @@
 import { execFileSync, spawn, type ChildProcess } from 'node:child_process';
 import { once } from 'node:events';
-import { PATIENCE } from '../patience.ts';
-import { ENVIRONMENT, PYTHON, REPOSITORY } from '../python.ts';
+import { ENVIRONMENT, forkServer, PYTHON, REPOSITORY } from '../python.ts';
 
 /** `ico3d serve` with a bundle, or `ico3d studio` with a folder, on a free port of this machine. */
 export class ChatServer {
@@ -15,7 +14,7 @@ export class ChatServer {
 
   /** @param more arguments of `ico3d serve` */
   static start(bundle: string, port = 0, ...more: string[]): Promise<ChatServer> {
-    return ChatServer.run(['serve', bundle, '--port', String(port), ...more]);
+    return ChatServer.of(forkServer(bundle, '--port', String(port), ...more));
   }
 
   /** @param folder where the recordings are */
@@ -28,8 +27,11 @@ export class ChatServer {
     return ChatServer.run(['studio', folder, '--port', '0', '--no-browser', ...more], { ...ENVIRONMENT, ICO3D_MODELS: models });
   }
 
-  private static async run(words: string[], env: NodeJS.ProcessEnv = ENVIRONMENT): Promise<ChatServer> {
-    const child = spawn(PYTHON, ['-m', 'ico3d.cli', ...words], { cwd: REPOSITORY, env, stdio: ['ignore', 'pipe', 'inherit'] });
+  private static run(words: string[], env: NodeJS.ProcessEnv = ENVIRONMENT): Promise<ChatServer> {
+    return ChatServer.of(spawn(PYTHON, ['-m', 'ico3d.cli', ...words], { cwd: REPOSITORY, env, stdio: ['ignore', 'pipe', 'inherit'] }));
+  }
+
+  private static async of(child: ChildProcess): Promise<ChatServer> {
     return new ChatServer(child, await readUrl(child));
   }
 
@@ -40,7 +42,7 @@ export class ChatServer {
 
   /** Ends it without a word, as the system does that has no memory left. */
   kill(): Promise<void> {
-    return this.stop('SIGKILL');
+    return this.stop('SIGUSR1');
   }
 
   async stop(signal: NodeJS.Signals = 'SIGINT'): Promise<void> {
@@ -49,16 +51,14 @@ export class ChatServer {
   }
 }
 
+/** The address that a server prints; a busy machine takes its time until then. */
 function readUrl(child: ChildProcess): Promise<string> {
   return new Promise((resolve, reject) => {
     let printed = '';
-    const timer = setTimeout(() => reject(new Error(`ico3d serve does not start: ${printed}`)), PATIENCE);
     child.stdout!.on('data', (chunk: Buffer) => {
       printed += chunk.toString();
       const url = /https?:\/\/\S+\//.exec(printed)?.[0];
-      if (!url) return;
-      clearTimeout(timer);
-      resolve(url);
+      if (url) resolve(url);
     });
     child.on('exit', (code) => reject(new Error(`ico3d serve ended with status ${code}: ${printed}`)));
   });
