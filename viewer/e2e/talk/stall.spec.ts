@@ -3,7 +3,7 @@ import { afterAll, beforeAll, expect, inject, test } from 'vitest';
 import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../../src/protocol.ts';
 import type { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
-import { readRecord, type Heard } from '../../support/browser/recorder.ts';
+import { readRecord, type Heard, type Record } from '../../support/browser/recorder.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { StallingLine } from '../../support/servers/stalling.ts';
 import { slowness } from '../../support/slowness.ts';
@@ -11,6 +11,7 @@ import { quantile } from '../../support/statistics.ts';
 import { finished, makeVoice, openPage, until } from '../../support/browser/talk.ts';
 
 const SLOW = 'This device or the line is too slow just now: what you say may not be heard.';
+const QUIET = 3000; // ms
 const STALL = 8000; // ms: more than a server takes at once of sound that comes late
 
 let line: StallingLine;
@@ -66,12 +67,19 @@ test('a network that stalls while the microphone is open brings no old sound, an
   expect(Math.abs(delay(live.slice(-60)) - delay(before))).toBeLessThan(100 * slowness());
 
   await page.click('#microphone');
+  await until(browser, isQuiet); // what was said last would take the place of what is typed
   await page.fill('#text', 'Who are you?');
   await page.keyboard.press('Enter');
   await until(browser, ({ received }) => received.some(({ type, text }) => type === 'answer' && text === 'I am Stella.'));
   const { sockets } = await page.evaluate(() => ({ sockets: window.record!.sockets.length }));
   expect(sockets).toBe(1);
 });
+
+/** Whether nothing has come of what was said for some seconds: a busy machine understands late. */
+function isQuiet({ received, loudness }: Record): boolean {
+  const last = received.findLast(({ type }) => ['transcript', 'answer', 'speech', 'state'].includes(type))!;
+  return last.type === 'state' && last.state === 'idle' && loudness.at(-1)!.at > last.at + QUIET;
+}
 
 /** When a chunk's last sample was recorded, ms of the page's clock, as the first chunks tell. */
 function recorded({ sample }: Heard, microphone: Heard[]): number {
