@@ -183,6 +183,12 @@ test.skipIf(!demo)('who leaves while it records, and who was deleted in another 
   expect(await page.isVisible('#open')).toBe(true);
   expect(await page.isVisible('#salvage')).toBe(true);
 
+  let clicked = () => {};
+  const held = new Promise<void>((resolve) => (clicked = resolve));
+  await page.route(({ pathname }) => pathname.endsWith('/recordings/Eva'), async (route) => {
+    await held; // else it looks now and then, and knows before somebody clicks
+    await route.continue();
+  });
   const other = await browser.context.newPage();
   other.on('dialog', (dialog) => void dialog.accept());
   await other.goto(server.url);
@@ -195,6 +201,7 @@ test.skipIf(!demo)('who leaves while it records, and who was deleted in another 
   await other.waitForSelector('#room:visible');
   await other.close();
   await page.click('#salvage');
+  clicked();
   await page.waitForSelector('#start:visible');
   await expect.poll(() => page.textContent('#problem')).toMatch(/^Eva was deleted elsewhere, .* begin a new recording here\.$/);
   await page.click('#people button');
