@@ -58,6 +58,7 @@ TOGETHER = {
     "chat/services/language/test_qwen.py": "transformers",
     "chat/services/recognition/test_whisper.py": "transformers",
     "chat/test_pipecat_internals.py": "transformers",
+    "common/unpacking/test_weights.py": "transformers",
     "head/test_encoders.py": "transformers",
     "measure/test_expression.py": "transformers",
     "motion/recorded/test_cutting.py": "gestures",

@@ -3,6 +3,7 @@
 import os
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from ico3d.avatar.animation.keyframes import read_animation
@@ -12,10 +13,10 @@ from ico3d.avatar.recorded import read_cuts
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.format import read_background
 from ico3d.capture.multiview.description import read_json
-from ico3d.capture.reading.arrays import read_numbers
+from ico3d.capture.reading.arrays import LARGEST, read_numbers
 from ico3d.capture.synthetic import SyntheticCapture
 from ico3d.common.files import MOST_NOTES
-from ico3d.errors import Ico3dError
+from ico3d.errors import CaptureError, Ico3dError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.scene.model_folder import TrainedScene
 from ico3d.splat.files.formats import read_file
@@ -51,6 +52,15 @@ def test_what_has_no_end_is_not_read(tmp_path, name, pipe):
         (tmp_path / name).symlink_to("/dev/zero")
     with pytest.raises(Ico3dError):
         READERS[name](tmp_path)
+
+
+def test_arrays_of_zeros_that_take_no_room_on_a_disk_are_not_read(tmp_path):
+    with (tmp_path / "points.npy").open("wb") as file:
+        about = {"descr": "<f8", "fortran_order": False, "shape": (LARGEST // 24 + 1, 3)}
+        np.lib.format.write_array_header_1_0(file, about)
+        file.truncate(file.tell() + 24 * (LARGEST // 24 + 1))
+    with pytest.raises(CaptureError, match="more than 256 MiB of numbers"):
+        read_numbers(tmp_path / "points.npy")
 
 
 @pytest.mark.parametrize(

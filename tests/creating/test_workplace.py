@@ -1,6 +1,13 @@
-import pytest
+import os
 
+import numpy as np
+import pytest
+from PIL import Image
+
+from ico3d.avatar.baking.command import _save_picture
+from ico3d.creating.events import Preview
 from ico3d.creating.settings import CreateSettings
+from ico3d.creating.telling import Terminal
 from ico3d.creating.workplace import workplace
 from ico3d.errors import CaptureError, SettingsError, StorageError
 from ico3d.training.listing.find_runs import find_runs
@@ -99,3 +106,22 @@ def test_what_is_created_is_listed_with_its_command(settings, tmp_path):
     with workplace(settings):
         pass
     assert state() == ("create", "finished", "", "")
+
+
+@pytest.mark.parametrize("pipe", [True, False])
+def test_a_folder_of_others_leads_to_no_other_file(settings, tmp_path, pipe):
+    """Its lock was emptied before anything was compared, and its picture written over."""
+    mine, work = tmp_path / "thesis.txt", tmp_path / "me.work"
+    mine.write_text("years of work")
+    work.mkdir()
+    if pipe:
+        os.mkfifo(work / "lock")
+    else:
+        (work / "lock").symlink_to(mine)
+    _refused(settings, StorageError, "cannot be written")
+    (work / "face.jpg").symlink_to(mine)
+    Terminal(settings)(Preview(0.5, np.zeros((4, 8, 3), np.uint8)))
+    (work / "strip.png").symlink_to(mine)
+    _save_picture(np.zeros((4, 8, 3), np.uint8), work / "strip.png")
+    assert mine.read_text() == "years of work"
+    assert Image.open(work / "face.jpg").size == Image.open(work / "strip.png").size == (8, 4)

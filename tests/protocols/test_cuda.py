@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from PIL import Image
 
 from ico3d.cli import main
@@ -42,7 +41,8 @@ FEW_OF_A_BODY = {
 def no_plots(monkeypatch):
     """They are drawn by the CPU anyway, and take half of the time."""
     monkeypatch.setattr(
-        Figure, "savefig", lambda figure, file, **options: Path(file).write_bytes(b"PNG")
+        "matplotlib.figure.Figure.savefig",
+        lambda figure, file, **options: Path(file).write_bytes(b"PNG"),
     )
 
 

@@ -1,8 +1,12 @@
 """The server of the studio page: who is let in, what is taken, and that deleting is deleting."""
 
+import asyncio
 import errno
+import threading
+from datetime import date
 from types import SimpleNamespace
 
+import httpx
 import pytest
 from starlette.testclient import TestClient
 
@@ -340,3 +344,32 @@ def test_what_is_deleted_while_it_is_looked_at_stays_deleted(page, room, video, 
 def test_others_need_https(capsys):
     assert main(["studio", "--host", "0.0.0.0", "--no-browser"]) == 1
     assert "browsers give their camera only to HTTPS pages" in capsys.readouterr().err
+
+
+async def test_others_are_answered_while_talks_begin(room, monkeypatch):
+    for name in ("Ida", "Ada"):
+        room.people.begin(name, "de", True, date.today())
+    begun = threading.Event()
+    monkeypatch.setattr(room.talks, "url", lambda _: "there" if begun.wait(20) else "")
+    sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
+    async with httpx.AsyncClient(transport=sending, base_url=HOME) as client:
+        asked = [f"/recordings/{name}/talk" for name in ("Ida", "Ada") * 32]  # more than threads
+        talks = [asyncio.create_task(client.post(path)) for path in asked]
+        await asyncio.sleep(0.2)
+        shown = await asyncio.wait_for(client.get("/recordings/"), 5)
+        assert shown.json()["people"] == ["Ada", "Ida"] and not any(t.done() for t in talks)
+        begun.set()
+        assert {(await talk).text for talk in talks} == {'{"url":"there"}'}
+
+
+async def test_no_talk_begins_of_somebody_who_was_deleted_meanwhile(room, monkeypatch):
+    room.people.begin("Ida", "de", True, date.today())
+    served: list[str] = []
+    monkeypatch.setattr(room.talks, "url", lambda avatar: served.append(avatar.stem) or "there")
+    sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
+    async with httpx.AsyncClient(transport=sending, base_url=HOME) as client:
+        async with room.lock("Ida"):
+            talk = asyncio.create_task(client.post("/recordings/Ida/talk"))
+            await asyncio.sleep(0.1)
+            room.people.delete("Ida")
+        assert ((await talk).status_code, served) == (404, [])

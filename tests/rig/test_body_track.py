@@ -145,3 +145,15 @@ def test_nothing_is_lost_where_nothing_can_be_written(track, tmp_path):
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(CaptureError, match="cannot be written"):
         write_body_track(track, tmp_path / "file" / "recording.smc")
+
+
+@pytest.mark.parametrize("kind", ["F8_E4M3", "BF16"])
+def test_numbers_that_numpy_has_not_are_refused(track, tmp_path, kind):
+    file = write_body_track(track, tmp_path)
+    size = int.from_bytes(file.read_bytes()[:8], "little")
+    about = json.loads(file.read_bytes()[8 : 8 + size])["__metadata__"]
+    joints = {"dtype": kind, "shape": [2, 3], "data_offsets": [0, 6 if kind[0] == "F" else 12]}
+    head = json.dumps({"__metadata__": about, "joints": joints}).encode()
+    file.write_bytes(len(head).to_bytes(8, "little") + head + bytes(joints["data_offsets"][1]))
+    with pytest.raises(CaptureError, match="is damaged"):
+        read_body_track(tmp_path, 5, 15.0)

@@ -39,7 +39,11 @@ def test_without_a_compiler_one_is_told(monkeypatch, tmp_path):
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
 @pytest.mark.slow
 def test_compiled_networks_compute_the_same_whatever_the_number_of_rows(monkeypatch):
+    from torch._inductor import config
+
     monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setattr(config, "compile_threads", 1)  # one kernel is no work for eight processes
+    monkeypatch.setattr(config.cpp, "vec_isa_ok", True)  # else each kind of vectors is tried first
     torch.manual_seed(0)
     network = Small(5)
     fast = accelerated(network, CPU, mixed_precision=False, compiled=True)

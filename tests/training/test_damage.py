@@ -1,12 +1,14 @@
 """Files that a disk has damaged: training goes on from what is whole, and nothing is removed."""
 
 import json
+import tracemalloc
 
 import pytest
 import torch
 
 from ico3d.errors import ModelError
 from ico3d.training.checkpoint import load_sealed, save_sealed, save_tensors
+from ico3d.training.log import MetricsLog
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import BEFORE, CHECKPOINT, RunFolder
 from training.walk import Walk
@@ -134,3 +136,18 @@ def test_damaged_metrics_stop_no_training(died):
     run_loop(Walk(), RunFolder(died, {}), SETTINGS)
     steps = [json.loads(line)["step"] for line in (died / "metrics.jsonl").read_text().splitlines()]
     assert steps == [0, 5, 15, 19]
+
+
+def test_metrics_without_an_end_of_a_line_are_not_kept_in_memory(died):
+    text = (died / "metrics.jsonl").read_bytes().splitlines(keepends=True)
+    with (died / "metrics.jsonl").open("wb") as file:
+        file.write(text[0])
+        file.truncate(file.tell() + (64 << 20))
+        file.seek(0, 2)
+        file.write(b"\n" + text[1])
+    tracemalloc.start()
+    MetricsLog(died, 15).close()
+    assert tracemalloc.get_traced_memory()[1] < 32 << 20
+    tracemalloc.stop()
+    steps = [json.loads(line)["step"] for line in (died / "metrics.jsonl").read_text().splitlines()]
+    assert steps == [0, 5]

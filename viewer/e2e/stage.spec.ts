@@ -142,7 +142,7 @@ test('keys and buttons fly to face, half and whole figure; a text takes the keys
   expect(await view()).toEqual({ shown: null, pressed: [] });
 });
 
-test('somebody stands on a floor with a shadow, bright or dark; behind the head is the plain colour', async () => {
+test('somebody stands on a floor with a shadow in a room, bright or dark, which all ways of drawing show alike', async () => {
   const colours = () =>
     page.evaluate(() => {
       const { stage, head, body } = window.ico3d!;
@@ -161,23 +161,26 @@ test('somebody stands on a floor with a shadow, bright or dark; behind the head 
         const rgba = new Uint8Array(4);
         const { width, height } = stage.renderer.domElement;
         gl.readPixels(((1 + place.x) * width) / 2, ((1 + place.y) * height) / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
-        return rgba[1]!;
+        const out = new Float32Array(3);
+        const eye = foot.clone().setFromMatrixPosition(camera.matrixWorld);
+        stage.scenery.colour(eye, foot.clone().add({ x, y, z }).sub(eye).normalize(), out, 0);
+        return { green: rgba[1]!, apart: Math.abs(255 * out[1]! - rgba[1]!) };
       };
       const seen = { shadow: at(0, 0, 0), beside: at(0.75, 0, 0), head: at(0, 1.2, 0) };
       stage.scene.traverse((node) => void (node.visible = true));
       stage.scenery.removeFromParent();
       return seen;
     });
-  const plain = await page.evaluate(async () => Math.round(255 * (await (await fetch('bundle/manifest.json')).json()).background[1]));
   await page.evaluate(() => window.ico3d!.stage.setBright(false));
   const dark = await colours();
   await page.evaluate(() => window.ico3d!.stage.setBright(true));
   const bright = await colours();
   for (const seen of [dark, bright]) {
-    expect(Math.abs(seen.head - plain)).toBeLessThan(3);
-    expect(seen.shadow).toBeLessThan(0.75 * seen.beside);
+    expect(seen.shadow.green).toBeLessThan(0.75 * seen.beside.green);
+    for (const { apart } of Object.values(seen)) expect(apart).toBeLessThan(4); // a pixel is not a point
   }
-  expect(bright.beside).toBeGreaterThan(dark.beside);
+  expect(bright.beside.green).toBeGreaterThan(2 * dark.beside.green);
+  expect(bright.head.green).toBeGreaterThan(dark.head.green + 60);
 });
 
 test('the page is light or dark as the system is, then as the visitor chooses', async () => {

@@ -1,11 +1,12 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 
-export const VERSION = 8;
+export const VERSION = 9;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second
 export const RESUME_SECONDS = 30;
+export const BEAT_SECONDS = 1;
 
 /** A matrix in row order. */
 export interface Matrix {
@@ -216,6 +217,11 @@ export interface AckMessage {
   frames: number;
 }
 
+/** The line is up; sent from `welcome` on wherever nothing else was sent for a second. Nobody tells a browser of a network that has gone without a word. A page that hears nothing for some seconds says so and tries another connection. */
+export interface BeatMessage {
+  type: "beat";
+}
+
 /** The avatar's state. */
 export interface StateMessage {
   type: "state";
@@ -356,38 +362,11 @@ export interface ErrorMessage {
   values: Record<string, number>;
 }
 
-export type ClientMessage =
-  | HelloMessage
-  | NotesMessage
-  | AudioMessage
-  | TextMessage
-  | SayMessage
-  | InterruptMessage
-  | ClockMessage
-  | TalkMessage
-  | HeardMessage
-  | DeafMessage;
+export type ClientMessage = HelloMessage | NotesMessage | AudioMessage | TextMessage | SayMessage | InterruptMessage | ClockMessage | TalkMessage | HeardMessage | DeafMessage;
 
-export type ServerMessage =
-  | WelcomeMessage
-  | PlaceMessage
-  | AckMessage
-  | StateMessage
-  | TranscriptMessage
-  | AnswerMessage
-  | SpokenMessage
-  | SpeechMessage
-  | TimelineMessage
-  | CuesMessage
-  | CallMessage
-  | EndMessage
-  | StopMessage
-  | PauseMessage
-  | ResumeMessage
-  | MetricsMessage
-  | ErrorMessage;
+export type ServerMessage = WelcomeMessage | PlaceMessage | AckMessage | BeatMessage | StateMessage | TranscriptMessage | AnswerMessage | SpokenMessage | SpeechMessage | TimelineMessage | CuesMessage | CallMessage | EndMessage | StopMessage | PauseMessage | ResumeMessage | MetricsMessage | ErrorMessage;
 
-export const SERVER_TYPES = ["welcome", "place", "ack", "state", "transcript", "answer", "spoken", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
+export const SERVER_TYPES = ["welcome", "place", "ack", "beat", "state", "transcript", "answer", "spoken", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
 
 /** The arrays of binary messages, in order. */
 export const TENSORS: Record<string, readonly Tensor[]> = {

@@ -131,7 +131,7 @@ export class Visit {
     let offered = () => {}; // says anew what headsets may do
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
     root.dataset.path = stage.painter.path;
-    watchCover(root, signal, (all, controls) => stage.keepClear(all, controls));
+    watchCover(root, signal, stage.keepClear.bind(stage));
     const home = server.home();
     const talker = { name, languages: manifest.persona.languages ?? [], home, kept: this.ports.keeps(home, identityOf(manifest)) };
     const page = makePage(root, words, talker, this.overlay, () => stage.figures, signal);

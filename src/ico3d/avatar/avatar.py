@@ -217,6 +217,8 @@ def load_placement(file: Path) -> tuple[Placement, np.ndarray]:
         values = {name: tensors[name].numpy() for name in names}
     except KeyError as error:
         raise ModelError(f"{file} lacks {error}: assemble the avatar again.") from error
+    except TypeError as error:  # numbers that numpy has not
+        raise ModelError(f"{file} is damaged ({error}): assemble the avatar again.") from error
     count, size = [*values["expressions"].shape, 0, 0][:2]
     expected = ((4, 4), (count, 4, 4), (count, size))
     for name, shape in zip(names, expected, strict=True):

@@ -1,13 +1,13 @@
 """Who an avatar is: name, knowledge and manner, from a bundle or a file (docs/conversation.md)."""
 
 import re
-import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from ico3d.bundle.limits import MAX_MANIFEST_BYTES, MAX_NOTES
+from ico3d.common.people.spelling import spelled
 from ico3d.common.typed import Rules, fill, parse_json, parse_toml, plain
 from ico3d.errors import BundleError
 
@@ -149,7 +149,7 @@ def _check_lengths(persona: Persona, where: str) -> None:
 
 def _letters(text: str) -> int:
     """How many letters a text has; one character may stand for eighteen."""
-    return len(unicodedata.normalize("NFKC", text))
+    return len(spelled("NFKC", text))
 
 
 def _check_note(note: str, number: int, path: Path) -> None:

@@ -12,6 +12,8 @@ from ico3d.errors import CaptureError
 PURPOSE = "straightening the pictures of a lens with distortion"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
 """Numbers of distortion coefficients that OpenCV's models may have."""
+LONGEST = 1e9
+"""Focal length in pixels that no lens has."""
 MOST_CHANGE = 3.0
 """Largest factor by which undistortion may change a focal length before the lens is refused."""
 
@@ -44,8 +46,11 @@ class Lens:
         values = np.array(self.distortion, np.float64)
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
             raise CaptureError(f"camera {self.name}: the intrinsics are no finite 3x3 matrix.")
-        if matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
-            raise CaptureError(f"camera {self.name}: the focal lengths must be above 0.")
+        if not all(0 < length < LONGEST for length in (matrix[0, 0], matrix[1, 1])):
+            raise CaptureError(
+                f"camera {self.name}: the focal lengths must be above 0 and below {LONGEST:g} "
+                "pixels."
+            )
         if self.width < 1 or self.height < 1:
             raise CaptureError(
                 f"camera {self.name}: pictures of {self.width}x{self.height} pixels."

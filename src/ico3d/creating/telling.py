@@ -3,6 +3,7 @@
 from PIL import Image
 from rich.console import Console
 
+from ico3d.common.files import write_atomic
 from ico3d.creating.events import Event, Looked, Made, Planned, Preview, Step, Voiced
 from ico3d.creating.settings import CreateSettings
 
@@ -32,7 +33,8 @@ class Terminal:
         elif isinstance(event, Planned):
             lines = self._of_plan(event)
         elif isinstance(event, Preview):
-            Image.fromarray(event.picture).save(self._face, quality=90)
+            picture = Image.fromarray(event.picture)
+            write_atomic(self._face, lambda path: picture.save(path, quality=90))
         elif isinstance(event, Made):
             lines = _of_avatar(event)
         for line in lines:

@@ -249,6 +249,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
 def _add_making(app: FastAPI, room: Room) -> None:
     """The making of an avatar, its progress, and the talk at its end."""
     making = ROOT + "{name}/making"
+    beginning = asyncio.Lock()  # of a talk, which holds a thread for seconds; all others need some
 
     @app.put(ROOT + "{name}/body")
     async def choose(name: str, request: Request) -> Response:
@@ -286,8 +287,9 @@ def _add_making(app: FastAPI, room: Room) -> None:
 
     @app.post(ROOT + "{name}/talk")
     async def talk(name: str) -> Response:
-        avatar = Places(room.people.person(name).folder).avatar
-        return JSONResponse({"url": await asyncio.to_thread(room.talks.url, avatar)})
+        async with room.lock(name), beginning:
+            avatar = Places(room.people.person(name).folder).avatar
+            return JSONResponse({"url": await asyncio.to_thread(room.talks.url, avatar)})
 
 
 def _status(room: Room, person: Person) -> dict[str, Any]:

@@ -22,6 +22,8 @@ VERSION = 1
 """Version of the file."""
 NUMBERS = {"faces": np.dtype(np.int32), "vertex_joints": np.dtype(np.uint8)}
 """Types of the arrays of indices."""
+_DAMAGE = (ValueError, KeyError, TypeError, OverflowError, AttributeError)
+"""What damaged files raise; AttributeError for kinds of numbers that numpy has not."""
 LONGEST = 1e3
 """Largest coordinate of roots and vertices in metres that a file may hold."""
 
@@ -152,7 +154,7 @@ def read_body_track(recording: Path, num_frames: int, fps: float) -> BodyTrack |
         return None
     try:
         track = _read(file)
-    except (OSError, SafetensorError, ValueError, KeyError, TypeError, OverflowError) as error:
+    except (OSError, SafetensorError, *_DAMAGE) as error:
         raise CaptureError(
             f"{file} is damaged ({error}): delete it and run ico3d capture pose again."
         ) from error
@@ -168,7 +170,7 @@ def _read(file: Path) -> BodyTrack:
     """Reads a file of a body track.
 
     Raises:
-        OSError, SafetensorError, ValueError, KeyError, TypeError, OverflowError: If it is damaged.
+        OSError, SafetensorError, or one of `_DAMAGE`: If it is damaged.
     """
     with cast(Any, safe_open(file, "numpy")) as content:  # untyped
         text = cast(dict[str, str], content.metadata() or {}).get("body_track", "{}")

@@ -16,6 +16,14 @@ TAIL = 4096
 """Bytes at the end of a metrics file that are certain to contain a complete entry."""
 
 
+LONGEST_LINE = 1 << 16
+"""Bytes of an entry; what is longer is none."""
+
+
+MOST_STEPS = 10**12
+"""Steps that no run has; Python's whole numbers may have thousands of digits, and are not shown."""
+
+
 class MetricsLog:
     """Appends numbers to `metrics.jsonl` and to TensorBoard's files.
 
@@ -29,7 +37,7 @@ class MetricsLog:
 
         path = folder / METRICS
         # In one piece: a run killed right here must not lose what earlier ones wrote.
-        write_atomic(path, "".join(_entries_before(path, first_step)).encode())
+        write_atomic(path, lambda temporary: _copy_before(path, first_step, temporary))
         self._file = path.open("a")
         self._board = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step)
 
@@ -46,18 +54,21 @@ class MetricsLog:
         self._board.close()
 
 
-def _entries_before(path: Path, step: int) -> list[str]:
-    """The whole lines of a metrics file that belong to earlier steps.
+def _copy_before(path: Path, step: int, target: Path) -> None:
+    """Writes the whole lines of a metrics file that belong to earlier steps, one by one.
 
     What a disk has damaged is dropped: no training depends on it.
     """
-    if not path.is_file():
-        return []
-    lines = path.read_text("utf-8", errors="replace").splitlines(keepends=True)
-    return [line for line in lines if line.endswith("\n") and _is_before(line, step)]
+    with target.open("wb") as written:
+        if not path.is_file():
+            return
+        with path.open("rb") as file:
+            while line := file.readline(LONGEST_LINE):
+                if line.endswith(b"\n") and _is_before(line, step):
+                    written.write(line)
 
 
-def _is_before(line: str, step: int) -> bool:
+def _is_before(line: bytes, step: int) -> bool:
     try:
         return loose_json(line)["step"] < step
     except (ValueError, LookupError, TypeError):
@@ -83,7 +94,8 @@ def latest_entry(folder: Path) -> dict | None:
 
 def is_step(value: object) -> bool:
     """Whether a value that was read is the number of a step."""
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+    plain = isinstance(value, int) and not isinstance(value, bool)
+    return plain and 0 <= value < MOST_STEPS
 
 
 def readable(numbers: Mapping[str, float]) -> str:

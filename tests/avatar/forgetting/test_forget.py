@@ -3,11 +3,21 @@
 import json
 import os
 import sys
+import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from ico3d.avatar.forgetting.choosing import (
+    ELSEWHERE,
+    belonging,
+    outermost,
+    remaining,
+    within,
+)
+from ico3d.avatar.forgetting.holdings import Holding
 from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.archive import write_zip
 from ico3d.bundle.format import write_bundle
@@ -298,3 +308,27 @@ def test_a_terminal_obeys_nothing_that_a_bundle_says(tmp_path, capsys):
 def bundle_in(folder: Path, likeness: str) -> Path:
     folder.mkdir(parents=True)
     return bundle(folder / "a.ico3d", likeness)
+
+
+def test_a_chain_of_thousands_of_models_takes_seconds_not_days(tmp_path):
+    """Each was made of the next one, of which the last one shows somebody."""
+    paths = [tmp_path / f"{number:04}" for number in range(3000)]
+    chain = [Holding(path, "a model", (), (origin,)) for path, origin in pairwise(paths)]
+    holdings = [*chain, Holding(paths[-1], "a model", ("Eve",)), Holding(tmp_path / "b", "", ())]
+    begin = time.process_time()
+    chosen = belonging(holdings, [], {"eve"})
+    assert [one.path for one in chosen] == paths == outermost(paths)
+    assert len(within(paths, chosen)) == len(paths)
+    assert len(list(remaining(holdings, chosen, paths))) == 1 + len(ELSEWHERE)
+    assert time.process_time() - begin < 2
+
+
+def test_a_model_of_an_endless_path_is_nobodys(project, capsys):
+    model(
+        project / "models/odd",
+        "head.json",
+        {"capture": {"likeness": "Ada"}},
+        capture=Path("a" * 300),
+    )
+    main(["forget", "Ada", "--project", str(project), "--yes"])
+    assert "removed" in capsys.readouterr().out

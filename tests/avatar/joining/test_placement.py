@@ -154,6 +154,9 @@ def test_damaged_placements_are_refused(avatar, name, value):
     save_tensors(folder / PLACEMENT, tensors | {name: torch.from_numpy(np.array(value))}, {})
     with pytest.raises(ModelError, match="must be finite and have the shape"):
         load_placement(folder / PLACEMENT)
+    save_tensors(folder / PLACEMENT, tensors | {name: tensors[name].bfloat16()}, {})
+    with pytest.raises(ModelError, match="Got unsupported ScalarType BFloat16"):
+        load_placement(folder / PLACEMENT)
     del tensors[name]
     save_tensors(folder / PLACEMENT, tensors, {})
     with pytest.raises(ModelError, match=f"lacks '{name}'"):

@@ -71,7 +71,7 @@ def test_poses_learn_from_pictures(capture):
     """The shoulder finds its angles."""
     trainer = trainer_of(capture, "skinned", window=CLIP, **{"rates.pose": 3e-2})
     assert shoulder_spread(capture, trainer) > 11
-    for index in range(360):
+    for index in range(160):
         trainer.step(index)
     assert shoulder_spread(capture, trainer) < 5
     assert 250 < len(trainer.model) <= 400
@@ -88,7 +88,7 @@ def test_joints_learn_from_pictures(tmp_path):
         changes = {"rates.joints": 2e-3, "rates.pose": 1e-6, "rates.root": 1e-6}
         changes |= {"skinning.shapes": 0, "loss.joints": weight}
         trainer = trainer_of(capture, "skinned", window=CLIP, **changes)
-        for index in range(200):
+        for index in range(125):
             trainer.step(index)
         off[weight] = abs(trainer.model.shared["rig_joints"][1, 1].item() - 0.2)
     assert off[0.0] < 0.03 and off[1e4] > 0.05

@@ -83,6 +83,7 @@ def test_interpolated_frames_are_told(folder):
         ({"eyes": np.zeros((4, 7), np.float32)}, r"'eyes' must be \(3, 7\), found \(4, 7\)"),
         ({"views": None}, "'views' must be .* found nothing"),
         ({"landmarks": np.full((3, 68, 3), np.nan, np.float32)}, "'landmarks' holds NaN"),
+        ({"landmarks": np.full((3, 68, 3), 1j, np.complex64)}, "'landmarks' holds no real"),
     ],
 )
 def test_a_track_of_another_recording_is_refused(folder, change, message):

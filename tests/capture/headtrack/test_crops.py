@@ -67,3 +67,12 @@ def test_a_search_shows_every_face_of_a_person_large_enough(person, place, known
 
 def test_nobody_there_means_nothing_to_look_at():
     assert search(80, 60, np.zeros((80, 60), np.float32)) == []
+
+
+@pytest.mark.parametrize("depth", [0.05, 0.008, 1e-9, 1e-300])
+def test_a_camera_within_the_head_shows_no_part_of_it(depth):
+    """Its part would have a side of 36,000 pixels at 8 mm, and took 5 GB."""
+    lens = np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]])
+    near = Camera(640, 480, lens, np.eye(4))
+    assert around(near, np.array([0, 0, depth])) is None
+    assert around(near, np.array([0, 0, 0.3])) == Part(-160, -240, 960)

@@ -15,6 +15,7 @@ from ico3d.capture.capture import EYE_NAMES
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait.files import camera_to_world, save_transforms
+from ico3d.common.files import MOST_NOTES
 from ico3d.errors import CaptureError
 from support.recordings import portrait_folder
 
@@ -261,6 +262,12 @@ def test_a_frame_that_is_no_object(folder):
 def test_action_units_in_another_encoding(folder):
     (folder / "au.csv").write_bytes(b"\xff\xfe")
     _fails(folder, "au.csv", "cannot be read")
+
+
+def test_a_table_that_takes_no_room_on_a_disk_is_not_read(folder):
+    with (folder / "au.csv").open("wb") as file:
+        file.truncate(MOST_NOTES + 1)
+    _fails(folder, "au.csv", "no small file")
 
 
 def test_half_a_picture_of_a_parsing(folder):

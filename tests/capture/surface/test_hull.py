@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ico3d.capture.surface import hull as hulls
 from ico3d.capture.surface.hull import Silhouette, focus, looked_at, visual_hull
 from ico3d.common.camera import Camera, look_at
 
@@ -111,3 +112,27 @@ def test_there_is_no_hull_without_cameras_that_look_at_one_place():
     assert visual_hull(_seen([one, parallel]), EDGE) is None
     assert visual_hull(_seen([one]), EDGE) is None
     np.testing.assert_allclose(focus([one, _camera(1.0)]), CENTER, atol=1e-9)
+
+
+def test_where_cameras_show_a_whole_town_voxels_are_as_large_as_the_memory_allows(monkeypatch):
+    monkeypatch.setattr(hulls, "MOST_CELLS", 60)
+    away = _from_center(visual_hull(_seen(_ring()), 1e-6))  # 10¹⁸ voxels
+    assert away.min() > RADIUS - 0.012 and np.median(away) < RADIUS + 0.02
+    monkeypatch.setattr(hulls, "MOST_LOOKS", 12 * 40**3)
+    fewer = _from_center(visual_hull(_seen(_ring()), 1e-6))
+    assert len(fewer) == pytest.approx((40 / 60) ** 2 * len(away), rel=0.1)
+
+
+def test_cameras_that_show_more_than_any_number_look_at_no_place():
+    far = [_camera(turn) for turn in (0.0, 1.5)]
+    wide = np.diag([1e-308, 1e-308, 1.0])
+    assert looked_at([Camera(10**6, 10, wide, camera.world_to_camera) for camera in far]) is None
+
+
+def test_a_lens_that_magnifies_a_million_times_takes_no_more_memory():
+    seen = _seen(_ring())
+    camera = seen[0].camera
+    tele = np.array([[1e9, 0, 100], [0, 1e9, 90], [0, 0, 1]])
+    odd = Camera(camera.width, camera.height, tele, camera.world_to_camera)
+    hull = visual_hull([*seen[1:], Silhouette(odd, np.ones((180, 200), bool))], EDGE)
+    assert hull is not None and _from_center(hull).max() < RADIUS + 0.08

@@ -2,6 +2,7 @@
 
 import subprocess
 import time
+from unittest.mock import Mock
 
 import av
 import pytest
@@ -48,9 +49,12 @@ def test_a_film_that_takes_too_long_is_not_opened(tmp_path, hurried, monkeypatch
     assert time.process_time() - before < 1
 
 
-def test_whoever_opens_a_film_opens_it_apart_first(tmp_path, hurried):
-    film = tmp_path / "a.avi"
-    film.write_bytes(SLOW["tags.avi"]())
+def test_whoever_opens_a_film_opens_it_apart_first(tmp_path, monkeypatch):
+    """What is refused there is opened by nobody."""
+    film = tmp_path / "a.mp4"
+    write_film(film)
+    monkeypatch.setattr(rehearsal.subprocess, "run", lambda *_, **__: Mock(returncode=-9))
+    monkeypatch.setattr(av, "open", lambda *_, **__: pytest.fail("it was opened"))
     for read in (lambda: read_sound(film), lambda: Clip(film).count):
         with pytest.raises(CaptureError) as error:
             read()

@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import gzip
 import itertools
-import socket
 import threading
 import time
 from datetime import UTC, datetime
@@ -20,6 +19,7 @@ from ico3d.chat.serving.network.certificates import own_certificate
 from ico3d.chat.serving.sites import Sites
 from ico3d.cli import main
 from ico3d.errors import SettingsError
+from support.chat.dripping import dripping
 from support.chat.serving import TYPED, free_port, serving
 
 pytestmark = pytest.mark.slow
@@ -201,29 +201,6 @@ async def test_a_server_that_says_nothing_is_not_waited_for(monkeypatch):
         assert told(await visitor.findings())[-1].startswith(
             "no conversation begins (nothing came for 0.2 s)"
         )
-
-
-@contextlib.contextmanager
-def dripping(begins):
-    """A port at which an answer begins so, and goes on with a letter now and then, without end."""
-
-    def drip(wire):
-        with contextlib.suppress(OSError), wire:
-            wire.recv(1 << 16)
-            wire.sendall(begins)
-            while True:
-                wire.sendall(b"a")
-                time.sleep(0.05)
-
-    def accept():
-        with contextlib.suppress(OSError):
-            while True:
-                threading.Thread(target=drip, args=(listener.accept()[0],), daemon=True).start()
-
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        threading.Thread(target=accept, daemon=True).start()
-        yield listener.getsockname()[1]
-        listener.shutdown(socket.SHUT_RDWR)
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,17 @@ import asyncio
 import contextlib
 import itertools
 import json
+import socket
+import threading
 
 import numpy as np
 import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.server import ServerProtocol
 
 from ico3d.bundle.format import SPEECH
-from ico3d.chat.performing.remote_mouth import AVOIDED, RemoteMouth
+from ico3d.chat.performing.remote_mouth import AVOIDED, FAILURES, RemoteMouth
 from ico3d.chat.remote import expression
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.settings.conversation import ChatSettings, Expression
@@ -121,7 +124,7 @@ class Odd:
     """A WebSocket server of something else."""
 
     def __init__(self, hello, answer):
-        self.hello, self.answer = hello, answer
+        self.hello, self.answer, self.left = hello, answer, asyncio.Event()
 
     async def __call__(self, scope, receive, send):
         if scope["type"] != "websocket":
@@ -131,12 +134,16 @@ class Odd:
         while (await receive())["type"] != "websocket.disconnect":
             if self.answer is not None:
                 await send({"type": "websocket.send", "bytes": self.answer})
+        self.left.set()
 
 
 NAN = np.full((1, 32), np.nan, np.float32).tobytes()
 
 
-@pytest.mark.parametrize("answer", [None, b"x", NAN, b"x" * 128 * 3 + b"y"])
+ROWS = np.zeros((1000, 32), np.float32).tobytes()
+
+
+@pytest.mark.parametrize("answer", [None, b"x", NAN, b"x" * 128 * 3 + b"y", ROWS, b""])
 @pytest.mark.parametrize("knows", [True, False])
 async def test_any_nonsense_is_answered_by_the_own_model(model, sha256, sound, knows, answer):
     own = {"model": sha256 if knows else "0" * 64, "rate": RATE, "fps": 25, "size": 32}
@@ -145,6 +152,55 @@ async def test_any_nonsense_is_answered_by_the_own_model(model, sha256, sound, k
         rows, lips = await asyncio.to_thread(remote, made, sound)
     assert lips._own is not None
     np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+
+
+def test_a_new_sentence_does_not_wait_for_the_answer_to_another(model, sha256):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        made = mouth(f"http://127.0.0.1:{silent.getsockname()[1]}", model, sha256)
+        asking = threading.Thread(target=made.lips().push, args=(np.ones(960),), daemon=True)
+        asking.start()
+        wire = silent.accept()[0]
+        wire.recv(1)
+        begun = threading.Thread(target=made.lips, daemon=True)
+        begun.start()
+        begun.join(LONG / 2)
+        assert asking.is_alive() and not begun.is_alive()
+        wire.close()
+
+
+def test_a_server_that_does_not_read_is_not_waited_for(model, sha256):
+    own = {"model": sha256, "rate": RATE, "fps": 25, "size": 32}
+
+    def greet():
+        wires.append(listener.accept()[0])
+        protocol = ServerProtocol()
+        protocol.receive_data(wires[0].recv(1 << 16))
+        protocol.send_response(protocol.accept(protocol.events_received()[0]))
+        protocol.send_text(json.dumps(own).encode())
+        wires[0].sendall(b"".join(protocol.data_to_send()))
+
+    def ask():
+        try:
+            made.ask(0, bytes(64 << 20), False, range(9))
+        except FAILURES as error:
+            said.append(error)
+
+    wires, said = [], []
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        threading.Thread(target=greet, daemon=True).start()
+        made = mouth(f"http://127.0.0.1:{listener.getsockname()[1]}", model, sha256, SHORT)
+        asking = threading.Thread(target=ask, daemon=True)
+        asking.start()
+        asking.join(LONG)
+        assert not asking.is_alive() and len(said) == 1
+        wires[0].close()
+
+
+async def test_a_server_with_an_odd_greeting_is_left(model, sha256, sound):
+    odd = Odd("Hello.", None)
+    async with serving(odd) as url:
+        await asyncio.to_thread(remote, mouth(url, model, sha256), sound)
+        await asyncio.wait_for(odd.left.wait(), LONG)
 
 
 async def test_a_greeting_nested_deep_is_nonsense_too(model, sha256, sound):
@@ -227,7 +283,9 @@ def test_an_hour_of_honest_sentences_is_borne():
 async def test_the_end_of_a_sentence_of_whole_rows_sends_nothing_empty(bundle, model, sha256):
     async with serving(expression_app(bundle)) as url:
         made, sent = mouth(url, model, sha256), []
-        made.ask = lambda _, message, first: sent.append(message) or np.zeros((0, 32), np.float32)
+        made.ask = lambda _, message, first, fitting: (
+            sent.append(message) or np.zeros((0, 32), np.float32)
+        )
         lips = made.lips()
         lips.push(np.ones(960, np.float32))
         assert lips.push(np.zeros(0, np.float32)).shape == (0, 32)

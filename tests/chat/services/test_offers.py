@@ -1,6 +1,8 @@
 """What there is to choose from: told at the start, on the page, and heeded."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from websockets.asyncio.client import connect
@@ -17,6 +19,7 @@ from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Hello, Offer, Welcome
 from support.chat.serving import serving
 
+TEXTS = Path(__file__).parents[3] / "viewer" / "src" / "words" / "texts.json"
 MISSING = "its weights are not here: fetch them."
 OFFLINE = ChatSettings(
     recognition=Choice("pocketsphinx"),
@@ -92,3 +95,11 @@ async def test_a_page_gets_the_services_it_wishes(bundle):
             assert isinstance(welcome, Welcome) and len(voices_of(welcome.offers)) == 3
             names.append(welcome.services.voice.name)
         assert names == ["Spare", "espeak-ng"]
+
+
+def test_services_without_a_name_of_their_own_have_words_on_the_page():
+    words = json.loads(TEXTS.read_text(encoding="utf-8"))
+    told = {text["en"] for key, text in words.items() if key.startswith("service.")}
+    titles = {provider.title for table in TABLES.values() for provider in table.values()}
+    names = {"Whisper", "pocketsphinx", "OpenVoice V2", "Kokoro", "Piper", "espeak-ng", "Hibari"}
+    assert titles - names == told - {"{name} ({detail})"}

@@ -12,8 +12,10 @@ from websockets.asyncio.client import connect
 from ico3d.chat.serving.limits import RETURNS, RETURNS_AT_ONCE
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import (
+    BEAT_SECONDS,
     VERSION,
     Answer,
+    Beat,
     Error,
     Hello,
     Place,
@@ -98,6 +100,16 @@ async def test_a_second_connection_takes_the_session_over(bundle):
         await again.send(Text("who are you"))
         await again.wait(Answer, where=lambda m: m.utterance == 1)
         await asyncio.gather(page.close(), again.close())
+
+
+async def test_a_line_that_carries_nothing_else_beats(bundle):
+    async with serving(bundle, TYPED) as (url, _):
+        page, _ = await open_page(url, microphone=False)
+        await page.heard(0)
+        silent = len(page.log)
+        await asyncio.sleep(3.5 * BEAT_SECONDS)
+        assert 2 <= len(page.messages(Beat, silent)) <= 4
+        await page.close()
 
 
 async def test_sessions_end_and_leave_nothing_behind(bundle):

@@ -10,7 +10,14 @@ from fastapi.responses import RedirectResponse, Response
 
 from ico3d.chat.settings.conversation import Memory, read_settings
 from ico3d.chat.settings.tools import Tool
-from ico3d.chat.tools.http import MOST_BYTES, MOST_DEPTH, Refused, answer, check_address
+from ico3d.chat.tools.http import (
+    MOST_BYTES,
+    MOST_DEPTH,
+    MOST_RECEIVED,
+    Refused,
+    answer,
+    check_address,
+)
 from ico3d.errors import SettingsError
 from support.chat.scripted_server import running
 
@@ -235,6 +242,27 @@ async def test_time_and_size_are_limited():
         assert "more than" in (await call(f"/big?size={MOST_BYTES + 1}"))["error"]
         assert await call("/slow", seconds=0.2) == {"error": "t did not answer within 0.2 seconds."}
         assert await call("/none") == {"status": 404, "body": "No such page."}
+
+
+@pytest.mark.parametrize("head", ["100 Continue", "103 Early Hints"])
+async def test_heads_before_an_answer_have_an_end(head):
+    sent = 0
+
+    async def flood(reader, writer):
+        nonlocal sent
+        await reader.readuntil(b"\r\n\r\n")
+        with contextlib.suppress(ConnectionError):
+            while True:
+                writer.write(f"HTTP/1.1 {head}\r\n\r\n".encode() * 100)
+                sent += 100
+                await writer.drain()
+        writer.close()
+
+    async with await asyncio.start_server(flood, "127.0.0.1", 0) as flooding:
+        place = f"127.0.0.1:{flooding.sockets[0].getsockname()[1]}"
+        said = await answer(Tool("t", "Test.", f"http://{place}/", seconds=3.0), {}, (place,))
+    assert said == {"error": f"t failed: its answer has more than {MOST_BYTES} bytes."}
+    assert sent < 10 * MOST_RECEIVED
 
 
 async def test_private_addresses_must_be_listed_themselves():

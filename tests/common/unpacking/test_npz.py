@@ -83,6 +83,17 @@ def test_a_subject_of_much_is_not_unpacked(tmp_path, peak):
     assert peak() < 1 << 20
 
 
+@pytest.mark.parametrize(
+    ("vertices", "shapes", "joints"), [(1 << 20, 1, 1), (100_000, 3000, 1), (100_000, 1, 3000)]
+)
+def test_a_subject_of_many_shapes_or_joints_is_refused(tmp_path, vertices, shapes, joints):
+    """Each would have a row of numbers for all vertices: 3.6 GB in the second case."""
+    names = {"bs_names": np.zeros(shapes, "U1"), "joint_names": np.zeros(joints, "U1")}
+    file = write(tmp_path / "a.npz", verts=np.zeros((vertices, 3), "u1"), **names)
+    with pytest.raises(CaptureError, match=f"{shapes} shapes and {joints} joints of {vertices}"):
+        load_npz(file)
+
+
 def test_a_cached_flow_of_more_than_was_measured_is_damaged(tmp_path, peak):
     file = write(tmp_path / "a.npz", energy=np.zeros(3), moving=np.zeros((3, 1 << 24), "u1"))
     tracemalloc.reset_peak()

@@ -6,9 +6,12 @@ import { refreshed } from '../../support/browser/drawing.ts';
 import { overHead } from '../../support/browser/head.ts';
 import { drawnBy } from '../../support/browser/path.ts';
 import { VIEWS } from '../../src/stage/camera/framing.ts';
+import type { ConversationView } from '../../src/talk/conversation.ts';
+import texts from '../../src/words/texts.json' with { type: 'json' };
 
 const AROUND = 'header button, #name, #state, header .way-back, main > *';
 const LONG = 'Words that fill a line, and then another one, and more of them. '.repeat(8);
+const STATES = Object.entries(texts).flatMap(([key, text]) => (key.startsWith('state.') ? Object.values(text) : []));
 const NOTICE = 'Das Mikrofon ist für diese Seite gesperrt: Erlauben Sie es in der Adressleiste, oder tippen Sie.';
 const SIZES = [
   [844, 390],
@@ -18,6 +21,7 @@ const SIZES = [
   [844, 200], // with a keyboard
   [390, 844],
   [352, 516], // floats on another page
+  [320, 480], // in another page
   [1440, 900],
   [1280, 800],
 ] as const;
@@ -38,11 +42,10 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
     });
     await browser.open(drawnBy('soft', demoUrl!));
     await page.waitForSelector('#captions:visible');
-    await page.waitForFunction(() => document.body.dataset.state === 'idle');
+    await page.waitForFunction(() => document.body.dataset.state === 'idle' && !window.ico3d!.conversation!.player.heard());
     await page.evaluate((text) => {
       document.getElementById('question')!.textContent = text.slice(0, 60);
       document.querySelector('#answer span')!.textContent = text;
-      document.getElementById('state')!.textContent = 'Sprechen oder tippen';
       document.getElementById('stop')!.classList.remove('gone');
     }, LONG);
   });
@@ -63,6 +66,19 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
     await refreshed(page);
   }
 
+  /** Says how the talk stands in the words, of all languages, that take most room. */
+  function writeLongestState(): Promise<void> {
+    return page.evaluate((texts) => {
+      const state = document.getElementById('state')!;
+      const room = (text: string) => {
+        state.textContent = text;
+        const { width, height } = state.getBoundingClientRect();
+        return width * height;
+      };
+      state.textContent = texts.reduce((longest, text) => (room(text) > room(longest) ? text : longest));
+    }, STATES);
+  }
+
   /** From now on the device offers VR and AR, or neither. */
   async function offerHeadsets(offered: boolean): Promise<void> {
     await page.evaluate((offered) => Object.assign(navigator.xr!, { offered }).dispatchEvent(new Event('devicechange')), offered);
@@ -73,12 +89,16 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
     beforeAll(async () => {
       await offerHeadsets(headsets); // before: what changes later than a second after the size leaves her where she is
       await sized(width, height);
+      await writeLongestState();
     });
 
-    test.each(VIEWS)('lies over neither face nor hair in the view %s', async (view) => {
+    test.each(VIEWS.flatMap((view) => ['', 'large'].map((size) => [view, size] as const)))('lies over neither face nor hair in the view %s (captions: %s)', async (view, size) => {
+      await page.evaluate((size) => void (document.documentElement.dataset.captionsSize = size), size);
+      await refreshed(page);
       await page.evaluate((view) => window.ico3d!.stage.orbit.show(view), view);
       const { head, over } = await overHead(page, AROUND);
-      await keepPicture(`overlays-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`);
+      await keepPicture(`overlays-${width}x${height}-${view}${headsets ? '-xr' : ''}${size && '-large'}.png`);
+      await page.evaluate(() => delete document.documentElement.dataset.captionsSize);
       expect(head).toBeGreaterThan(height > 256 ? 300 : 100);
       expect(over).toEqual([]);
     });
@@ -105,9 +125,35 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
         const answer = document.getElementById('answer')!;
         return { asked: document.getElementById('question')!.clientHeight, lines: answer.clientHeight / parseFloat(getComputedStyle(answer).lineHeight) };
       });
-      expect(asked).toBeGreaterThan(10);
-      expect(lines).toBeGreaterThan(height < 256 ? 1.9 : width === 667 ? 2.9 : 3.9);
+      if (width > 320) expect(asked).toBeGreaterThan(10);
+      expect(lines).toBeGreaterThan(height < 256 ? 1.9 : width === 667 || width === 320 ? 2.9 : 3.9);
       expect(Math.abs(lines - Math.round(lines))).toBeLessThan(0.05);
+    });
+
+    test.each(['', 'large'])('goes through a long sentence by pages, each of which is seen as a whole (captions: %s)', async (size) => {
+      const pages = await page.evaluate(([text, size]) => {
+        document.documentElement.dataset.captionsSize = size;
+        const answer = document.getElementById('answer')!;
+        const view = (window.ico3d!.conversation as unknown as { view: ConversationView }).view;
+        const ends = [...text.matchAll(/\S+\s*/g)].map(({ index, 0: word }) => [index, index + word.length] as const);
+        const isSeen = (node: Node, from: number, to: number) => {
+          const range = document.createRange();
+          range.setStart(node, from);
+          range.setEnd(node, to);
+          const [place, word] = [answer.getBoundingClientRect(), range.getBoundingClientRect()];
+          return word.top >= place.top - 3 && word.bottom <= place.bottom + 3 && getComputedStyle(node.parentElement!).visibility === 'visible';
+        };
+        const pages = ends.map(([, heard]) => {
+          view.heard({ utterance: 1e6, first: 0, text, heard });
+          const [said, next] = [...answer.children].map(({ firstChild }) => firstChild);
+          return ends.map(([from, to]) => (to <= heard ? isSeen(said!, from, to - 1) : isSeen(next!, from - heard, to - heard - 1)));
+        });
+        delete document.documentElement.dataset.captionsSize;
+        return pages;
+      }, [LONG.trim(), size] as const);
+      for (const [i, seen] of pages.entries()) expect.soft(seen[i], `word ${i} while it is heard`).toBe(true);
+      const counts = pages.map((_, i) => pages.filter((seen) => seen[i]).length).slice(0, -13); // how often a word is seen
+      expect(Math.min(...counts)).toBeGreaterThan(2); // more than the moment in which it is said
     });
 
     describe.runIf(height < 480).each([

@@ -4,13 +4,30 @@ import { footprintOf, type Ground } from './camera/ground.ts';
 
 const SHADOW = [0.3, 0.22] as const; // m to the side and to the front where it has faded to a third, until feet are known
 const NOTICED = 0.004; // m by which feet move before their shadow does
+const LAMP = 0.12; // m over the eyes: the middle of the light on the wall
+const POOL = 0.45; // m from there to where half of the light is gone
+const PUDDLE = 1.3; // m around the feet to where the light on the floor has faded to a third
+const FLOOR = [0.9, 0.3] as const; // of the wall's colour beside that light, and how much of the wall's light the feet get
+/** Of a room: the wall where its light is, and far from there; display values. */
+const ROOMS: Record<'dark' | 'bright', Record<'lit' | 'unlit', readonly [number, number, number]>> = {
+  dark: { lit: [0.42, 0.37, 0.335], unlit: [0.105, 0.09, 0.08] },
+  bright: { lit: [0.96, 0.935, 0.9], unlit: [0.71, 0.675, 0.635] },
+};
+/**
+ * How much of the room's colour is behind a person, and behind a head alone; the rest is the colour on which they
+ * were trained. Of a head alone less is known: its edges hold some of the place where it was recorded.
+ */
+const OWN = { person: 0.75, head: 0.25 };
 
 /**
- * A wall and a floor that go over into each other, and a soft shadow under the feet, behind all
- * Gaussians. Where heads are, the colour is that on which the person was trained: edges stay clean.
+ * A room behind all Gaussians: a wall in the light of a lamp that falls off around whoever stands before it, a
+ * floor that goes over into the wall, and a soft shadow under the feet.
  */
 export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMaterial> implements Backcloth {
   version = 0;
+  private readonly own: THREE.Vector3;
+  private bright = false;
+  private share: number = OWN.person;
   private ground: Ground | null = null;
   private followed: Float32Array | null = null;
 
@@ -18,8 +35,9 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
   constructor(colour: readonly [number, number, number]) {
     const uniforms = {
       clipToWorld: { value: new THREE.Matrix4() },
-      base: { value: new THREE.Vector3(...colour) },
-      bright: { value: 0 },
+      lit: { value: new THREE.Vector3() },
+      unlit: { value: new THREE.Vector3() },
+      lamp: { value: new THREE.Vector3() },
       foot: { value: new THREE.Vector3() },
       up: { value: new THREE.Vector3(0, 1, 0) },
       front: { value: new THREE.Vector3(0, 0, 1) },
@@ -31,17 +49,20 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     const material = new THREE.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms, transparent: true });
     material.depthWrite = false; // it is as far away as can be: what is solid lies before it
     super(new THREE.PlaneGeometry(2, 2), material);
+    this.own = new THREE.Vector3(...colour);
+    this.paint();
     this.frustumCulled = false;
     this.renderOrder = -1;
     this.visible = false; // until somebody stands there
   }
 
   /**
-   * Puts the floor under somebody.
+   * Puts the floor under somebody, and the light behind their head.
    *
-   * @param feet whether somebody's feet cast a shadow on it
+   * @param eyes the point between them
+   * @param feet whether somebody's feet cast a shadow on it; else a head is there alone
    */
-  stand(ground: Ground, feet = true): void {
+  stand(ground: Ground, eyes: THREE.Vector3, feet = true): void {
     const { foot, up, toward } = ground;
     const { uniforms } = this.material;
     this.ground = ground;
@@ -51,9 +72,11 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     uniforms.shadow!.value.set(...SHADOW);
     uniforms.up!.value.copy(up);
     uniforms.front!.value.copy(toward);
+    uniforms.lamp!.value.copy(eyes).addScaledVector(up, LAMP);
     uniforms.depth!.value = feet ? 1 : 0;
+    this.share = feet ? OWN.person : OWN.head;
     this.visible = true;
-    this.version++;
+    this.paint();
   }
 
   /**
@@ -81,7 +104,15 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
 
   /** Shows a bright room, or a dark one. */
   setBright(bright: boolean): void {
-    this.material.uniforms.bright!.value = bright ? 1 : 0;
+    this.bright = bright;
+    this.paint();
+  }
+
+  private paint(): void {
+    const { lit, unlit } = ROOMS[this.bright ? 'bright' : 'dark'];
+    const { uniforms } = this.material;
+    uniforms.lit!.value.copy(this.own).lerp(COLOUR.set(...lit), this.share);
+    uniforms.unlit!.value.copy(this.own).lerp(COLOUR.set(...unlit), Math.sqrt(this.share)); // nobody's edges are there
     this.version++;
   }
 
@@ -92,31 +123,31 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
 
   /** The same as the shader, for pictures that are drawn without. */
   colour(eye: THREE.Vector3, way: THREE.Vector3, out: Float32Array, at: number): void {
-    const { base, foot, up, front, under } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
-    const shadow = this.material.uniforms.shadow!.value as THREE.Vector2;
-    const { bright, depth } = this.material.uniforms as Record<string, { value: number }>;
-    const light = bright!.value > 0.5;
+    const { lit, unlit, lamp, foot, up, front, under } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const glow = glowOf(PLACE.copy(lamp!.value).sub(eye), way);
     const rise = way.dot(up!.value);
-    const height = (eye.x - foot!.value.x) * up!.value.x + (eye.y - foot!.value.y) * up!.value.y + (eye.z - foot!.value.z) * up!.value.z;
-    const sky = smoothstep(0.12, 0.6, rise);
-    let [ground, far, shade] = [0, 1, 1];
+    const height = SIDE.copy(eye).sub(foot!.value).dot(up!.value);
+    let [puddle, wall, shade] = [0, 1, 1];
     if (height > 0 && rise < -1e-4) {
       const place = PLACE.copy(way).multiplyScalar(-height / rise).add(eye).sub(foot!.value);
-      const away = place.length();
-      ground = smoothstep(0, 2.2, away);
-      far = smoothstep(1.2, 5, away);
-      place.add(foot!.value).sub(under!.value);
-      const side = place.dot(SIDE.crossVectors(up!.value, front!.value)) / shadow.x;
-      const ahead = place.dot(front!.value) / shadow.y;
-      const near = side * side + ahead * ahead;
-      shade = 1 - depth!.value * (0.34 * Math.exp(-near) + 0.22 * Math.exp(-6 * near));
+      wall = smoothstep(1.2, 5, place.length());
+      puddle = FLOOR[1] * Math.exp(-place.lengthSq() / PUDDLE ** 2);
+      shade = 1 - this.shadowAt(place.add(foot!.value).sub(under!.value), up!.value, front!.value);
     }
     for (let channel = 0; channel < 3; channel++) {
-      const own = base!.value.getComponent(channel);
-      const shaded = (dark: number, bright: number) => (light ? mix(own, 1, bright) : own * dark);
-      const floor = mix(shaded(1.06, 0.3), shaded(0.78, 0.12), ground);
-      out[at + channel] = far < 1 || shade < 1 ? mix(floor, own, far) * shade : mix(own, shaded(0.66, 0.5), sky);
+      const light = lit!.value.getComponent(channel);
+      const colour = mix(unlit!.value.getComponent(channel), light, glow);
+      out[at + channel] = mix(mix(FLOOR[0] * colour, light, puddle), colour, wall) * shade;
     }
+  }
+
+  /** How dark the shadow is at a place of the floor, from the middle under the feet. */
+  private shadowAt(place: THREE.Vector3, up: THREE.Vector3, front: THREE.Vector3): number {
+    const { shadow, depth } = this.material.uniforms as { shadow: { value: THREE.Vector2 }; depth: { value: number } };
+    const side = place.dot(SIDE.crossVectors(up, front)) / shadow.value.x;
+    const ahead = place.dot(front) / shadow.value.y;
+    const near = side * side + ahead * ahead;
+    return depth.value * (0.34 * Math.exp(-near) + 0.22 * Math.exp(-6 * near));
   }
 
   dispose(): void {
@@ -130,7 +161,20 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
   };
 }
 
-const [PLACE, SIDE] = [new THREE.Vector3(), new THREE.Vector3()];
+const [PLACE, SIDE, COLOUR] = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
+
+/**
+ * How much of the lamp's light is on the wall in a direction of length 1: half at `POOL` metres beside the lamp's
+ * middle. It falls off at every scale, so that close-ups and whole figures have depth.
+ *
+ * @param lamp from the eye
+ */
+function glowOf(lamp: THREE.Vector3, way: THREE.Vector3): number {
+  const distance = lamp.length();
+  const cosine = way.dot(lamp) / distance;
+  const beside = (4 * distance ** 2 * (1 - cosine)) / (1.0001 + cosine); // m², squared; twice the tangent of half the angle
+  return 1 / (1 + beside / POOL ** 2);
+}
 
 function mix(from: number, to: number, share: number): number {
   return from + share * (to - from);
@@ -151,28 +195,33 @@ const VERTEX = `
   }
 `;
 
+const number = (value: number) => value.toFixed(4); // as GLSL reads one
+
 // Colours are display values, as Gaussians are blended; noise of half a level hides the steps between them.
 const FRAGMENT = `
-  uniform vec3 base, foot, under, up, front;
+  uniform vec3 lit, unlit, lamp, foot, under, up, front;
   uniform vec2 shadow;
-  uniform float bright, depth, alone;
+  uniform float depth, alone;
   varying vec3 ray;
 
-  vec3 shade(float dark, float light) {
-    return bright > 0.5 ? mix(base, vec3(1.0), light) : base * dark;
+  float glowOf(vec3 toLamp, vec3 way) {
+    float distance = length(toLamp);
+    float cosine = dot(way, toLamp) / distance;
+    float beside = 4.0 * distance * distance * (1.0 - cosine) / (1.0001 + cosine);
+    return 1.0 / (1.0 + beside / ${number(POOL ** 2)});
   }
 
   void main() {
     vec3 way = normalize(ray);
     float rise = dot(way, up);
-    vec3 colour = mix(base, shade(0.66, 0.5), smoothstep(0.12, 0.6, rise));
+    vec3 colour = mix(unlit, lit, glowOf(lamp - cameraPosition, way));
     float dark = 0.0;
     float height = dot(cameraPosition - foot, up);
     if (height > 0.0 && rise < -1e-4) {
       vec3 place = cameraPosition - way * height / rise - foot;
-      float far = length(place);
-      vec3 ground = mix(shade(1.06, 0.3), shade(0.78, 0.12), smoothstep(0.0, 2.2, far));
-      colour = mix(ground, base, smoothstep(1.2, 5.0, far));
+      float puddle = ${number(FLOOR[1])} * exp(-dot(place, place) / ${number(PUDDLE ** 2)});
+      vec3 ground = mix(${number(FLOOR[0])} * colour, lit, puddle);
+      colour = mix(ground, colour, smoothstep(1.2, 5.0, length(place)));
       vec3 away = place + foot - under;
       vec2 aside = vec2(dot(away, cross(up, front)), dot(away, front)) / shadow;
       float near = dot(aside, aside);

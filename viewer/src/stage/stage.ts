@@ -39,7 +39,7 @@ export class Stage {
   /** Called when the browser takes the picture away and does not give it back. */
   onGone: () => void = () => {};
   private readonly quality = new Quality(ladder({ backdrop: false, gaussians: false }));
-  private covered = { all: 0, controls: 0 }; // pixels at the lower edge
+  private covered = { all: 0, controls: 0, words: 0 }; // pixels at the lower edge, and at the upper one
   private readonly canvas: HTMLCanvasElement;
   private readonly manifest: Manifest;
   private readonly actors: Actor[] = [];
@@ -194,9 +194,9 @@ export class Stage {
     const rooms = this.actors.filter(({ thin }) => thin);
     for (const object of rooms.flatMap(({ objects }) => objects)) object.visible = !through;
     scenery.setShadowAlone(through);
-    const place = presentation ?? (meeting?.stands ? meeting : null);
-    scenery.visible = place !== null;
-    if (place) scenery.stand(place.ground, place.stands);
+    const place = presentation ?? meeting;
+    scenery.visible = meeting !== null;
+    if (place && meeting) scenery.stand(place.ground, meeting.eyes, place.stands);
     const shown = presentation ? through || rooms.length === 0 : !this.transparent && rooms.length === 0;
     if (shown) this.scene.add(scenery);
     else scenery.removeFromParent();
@@ -213,9 +213,10 @@ export class Stage {
    *
    * @param all pixels that controls or captions lie on
    * @param controls pixels that controls lie on
+   * @param words pixels at the upper edge that words lie on, close to the head
    */
-  keepClear(all: number, controls = all): void {
-    this.covered = { all, controls };
+  keepClear(all: number, controls = all, words = 0): void {
+    this.covered = { all, controls, words };
     this.fit();
   }
 
@@ -354,7 +355,8 @@ export class Stage {
     const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS);
     painter.fit(width, height, ratio, this.size || this.fine ? 1 : this.quality.level.pixels);
     const share = (pixels: number) => Math.max(LEAST_FREE, 1 - pixels / (clientHeight || height));
-    this.orbit.fit({ aspect: width / height, free: share(this.covered.all), clear: share(this.covered.controls) });
+    const top = this.covered.words / (clientHeight || height);
+    this.orbit.fit({ aspect: width / height, free: share(this.covered.all), clear: share(this.covered.controls), top });
     this.dirty = true;
   }
 }

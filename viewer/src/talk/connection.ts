@@ -2,13 +2,16 @@ import {
   RESUME_SECONDS,
   VERSION,
   type AckMessage,
+  type BeatMessage,
   type ClientMessage,
   type PlaceMessage,
   type ServerMessage,
+  type SpeechMessage,
   type WelcomeMessage,
 } from '../protocol.ts';
 import { say, type Sentence } from '../words/text.ts';
-import { SoundQueue } from './sound-queue.ts';
+import { Silence } from './line/silence.ts';
+import { SoundQueue } from './line/sound-queue.ts';
 import { told } from './told.ts';
 import { decode, encode } from './wire.ts';
 
@@ -17,6 +20,8 @@ const LONGEST_RETRY = 5000; // while the session may still be resumed
 const FIRST_VISIT = 5000; // ms until a server whose queue is full is asked again
 const LONGEST_VISIT = 60_000;
 const FULL = 1013; // close code: the queue is full, too
+const SILENT = 4000; // close code: another line speaks
+const LONGEST_HANDSHAKE = 8000; // ms, of a line that is to go on with a session
 
 /** The session is over. */
 export interface Ending {
@@ -28,7 +33,7 @@ export interface Ending {
 }
 
 /** What the server says once the line is up: all but what keeps the line itself. */
-export type SessionMessage = Exclude<ServerMessage, WelcomeMessage | PlaceMessage | AckMessage>;
+export type SessionMessage = Exclude<ServerMessage, WelcomeMessage | PlaceMessage | AckMessage | BeatMessage>;
 
 /** What a connection tells its owner. */
 export interface ConnectionEvents {
@@ -40,8 +45,10 @@ export interface ConnectionEvents {
    * @param replaced there was one, which the server no longer has
    */
   welcome(message: WelcomeMessage, replaced: boolean): void;
-  /** The line is down; the session is resumed as soon as it is up again. */
+  /** The line is down, or silent; the session is resumed as soon as there is one again. */
   lost(): void;
+  /** The line that was silent speaks again: nothing is lost. */
+  regained(): void;
   /** All places are taken; the server keeps one in a queue, and the line stays up for it. */
   queued(place: PlaceMessage): void;
   /** The line loses sound, or carries it again. */
@@ -51,7 +58,9 @@ export interface ConnectionEvents {
 
 /** One WebSocket that comes back: after a drop it resumes its session where it broke off. */
 export class Connection {
-  private socket: WebSocket | null = null;
+  private socket: WebSocket | null = null; // that carries the session, or is to
+  private trial: WebSocket | null = null; // beside one that is silent
+  private silentSince: number | null = null; // ms on the performance clock
   private session: string | null = null;
   private place: string | null = null; // in the queue, until the session begins
   private lastIndex = -1;
@@ -63,6 +72,7 @@ export class Connection {
   private fatal: Pick<Ending, 'sentence' | 'again'> | null = null; // the server's last word
   private over = false; // the session is, and no other one has begun
   private readonly sound: SoundQueue;
+  private readonly silence = new Silence(() => this.fellSilent());
   private readonly url: () => string;
   private readonly events: ConnectionEvents;
 
@@ -76,23 +86,28 @@ export class Connection {
   /** Connects, unless it is trying to already. */
   open(): void {
     clearTimeout(this.retry);
-    if (this.socket) return;
+    if (this.trial || (this.socket && this.silentSince === null)) return;
     this.lastUp ??= performance.now();
     const socket = new WebSocket(this.url());
+    const hangs = this.session ? setTimeout(() => this.abandon(socket), LONGEST_HANDSHAKE) : undefined;
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
-      const { lastIndex: last_index, wishes } = this;
-      const session = this.place ?? this.session;
-      socket.send(encode({ type: 'hello', version: VERSION, session, last_index, wishes }));
+      clearTimeout(hangs);
+      this.opened(socket);
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
-    socket.onclose = ({ code }) => this.closed(code);
-    this.socket = socket;
+    socket.onclose = ({ code }) => {
+      clearTimeout(hangs);
+      this.closed(socket, code);
+    };
+    if (this.socket) this.trial = socket;
+    else this.socket = socket;
   }
 
-  /** Sends if the line is up; false if it is not. */
+  /** Sends if the line is up; false if it is not. What only holds now is given to a silent one, too. */
   send(message: ClientMessage): boolean {
-    if (!this.welcomed) return false;
+    const asks = message.type === 'text' || message.type === 'say';
+    if (!this.welcomed || (asks && this.silentSince !== null)) return false;
     if (message.type === 'audio' || message.type === 'talk') this.sound.push(message);
     else this.socket!.send(encode(message));
     return true;
@@ -109,23 +124,84 @@ export class Connection {
   close(): void {
     clearTimeout(this.retry);
     this.welcomed = false;
-    if (!this.socket) return;
-    this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
-    this.socket.close(1000);
-    this.socket = null;
+    this.leave(this.trial, 1000);
+    this.leave(this.socket, 1000);
+    this.socket = this.trial = null;
+    this.speaks();
+    this.silence.end();
+  }
+
+  private opened(socket: WebSocket): void {
+    if (socket === this.trial) this.change(socket);
+    const { lastIndex: last_index, wishes } = this;
+    const session = this.place ?? this.session;
+    socket.send(encode({ type: 'hello', version: VERSION, session, last_index, wishes }));
+  }
+
+  /** Another line, or none, takes the place of one that is silent. */
+  private change(socket: WebSocket | null): void {
+    this.leave(this.socket, SILENT);
+    this.socket = socket;
+    this.trial = null;
+    this.lastUp = performance.now();
+    this.welcomed = false;
+    this.speaks();
+    this.silence.end();
+  }
+
+  /** Hears nothing more of a line, and closes it. */
+  private leave(socket: WebSocket | null, code: number): void {
+    if (!socket) return;
+    socket.onopen = socket.onmessage = socket.onclose = null;
+    socket.close(code);
+  }
+
+  /** Whatever it was, no line is silent now; returns whether one was. */
+  private speaks(): boolean {
+    const was = this.silentSince !== null;
+    this.silentSince = null;
+    return was;
+  }
+
+  private fellSilent(): void {
+    this.silentSince = performance.now();
+    this.events.lost();
+    this.wait = 0;
+    this.open();
+  }
+
+  /** A handshake that takes too long: the network may be another one now. */
+  private abandon(socket: WebSocket): void {
+    if (socket !== this.socket && socket !== this.trial) return; // it was left already
+    this.leave(socket, SILENT);
+    this.closed(socket, 1006);
   }
 
   private receive(frame: string | ArrayBuffer): void {
+    if (this.welcomed) this.silence.heard();
+    if (this.speaks()) this.goOn();
     const message = decode(frame);
     if (message.type === 'welcome') this.welcome(message);
     else if (message.type === 'place') this.queue(message);
     else if (message.type === 'ack') this.sound.acknowledge(message.frames);
     else if (message.type === 'error' && message.fatal) this.hangUp(told(message), message.again);
-    else if (message.type !== 'speech') this.events.message(message);
-    else if (message.index > this.lastIndex) {
-      this.lastIndex = message.index; // a resume may repeat what is already here
-      this.events.message(message);
-    }
+    else if (message.type === 'speech') this.speech(message);
+    else if (message.type !== 'beat') this.events.message(message);
+  }
+
+  /** The line was silent and is not any more: no other one is needed. */
+  private goOn(): void {
+    clearTimeout(this.retry);
+    this.leave(this.trial, SILENT);
+    this.trial = null;
+    this.wait = 0;
+    this.events.regained();
+  }
+
+  private speech(message: SpeechMessage): void {
+    if (message.index <= this.lastIndex) return; // a resume may repeat what is already here
+    this.lastIndex = message.index;
+    this.events.message(message);
   }
 
   private welcome(message: WelcomeMessage): void {
@@ -140,6 +216,7 @@ export class Connection {
     this.over = false;
     this.sound.reset();
     this.welcomed = true;
+    this.silence.heard();
     this.events.welcome(message, replaced);
   }
 
@@ -158,11 +235,16 @@ export class Connection {
     this.socket!.close();
   }
 
-  private closed(code: number): void {
+  private closed(socket: WebSocket, code: number): void {
+    if (socket === this.trial) return this.tried();
     const now = performance.now();
     if (this.welcomed || (this.place !== null && this.wait === 0)) this.lastUp = now;
     this.welcomed = false;
-    this.socket = null;
+    this.silence.end();
+    this.speaks();
+    this.socket = this.trial;
+    this.trial = null;
+    if (this.socket) return; // it is being tried already
     if (this.fatal) this.end(this.fatal, code === FULL);
     else if (this.over || now - this.lastUp! > 1000 * RESUME_SECONDS) {
       this.end({ sentence: say('unreachable'), again: true }, true);
@@ -170,6 +252,13 @@ export class Connection {
       this.events.lost();
       this.openLater(FIRST_RETRY, LONGEST_RETRY);
     }
+  }
+
+  /** No other line took the place of the silent one, which is not waited for for ever. */
+  private tried(): void {
+    this.trial = null;
+    if (performance.now() - this.silentSince! > 1000 * RESUME_SECONDS) this.change(null);
+    this.openLater(FIRST_RETRY, LONGEST_RETRY);
   }
 
   /** @param bySelf whether a new session is tried without being asked for */
@@ -187,6 +276,7 @@ export class Connection {
   }
 
   private openLater(first: number, longest: number): void {
+    clearTimeout(this.retry);
     this.wait = Math.min(Math.max(first, 2 * this.wait), longest);
     this.retry = setTimeout(() => this.open(), this.wait);
   }

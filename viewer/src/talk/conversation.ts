@@ -131,6 +131,7 @@ export class Conversation {
       welcome: (message, replaced) => this.welcome(message, replaced),
       queued: (place) => this.queued(place),
       lost: () => this.lost(),
+      regained: () => this.regained(),
       stalled: (stalls) => view.line(stalls ? 'slow' : 'up'),
       ended: (ending) => this.ended(ending),
     });
@@ -277,6 +278,11 @@ export class Conversation {
   private lost(): void {
     this.view.line('lost');
     this.view.state('connecting');
+  }
+
+  private regained(): void {
+    this.view.line('up');
+    this.view.state(this.state);
   }
 
   private ended(ending: Ending): void {

@@ -1,4 +1,5 @@
 import type { ClientMessage, WelcomeMessage } from '../protocol.ts';
+import { serviceName } from '../words/services.ts';
 import { say, type Sentence } from '../words/text.ts';
 import { Dictation, recognitionOf } from './dictation.ts';
 
@@ -68,6 +69,6 @@ export class Listening {
     this.end();
     this.deaf = reason;
     this.send({ type: 'deaf', reason });
-    this.view.notice(this.fallback ? say('dictation.server', { name: this.fallback }) : say('dictation.typing'));
+    this.view.notice(this.fallback ? say('dictation.server', { name: serviceName(this.fallback) }) : say('dictation.typing'));
   }
 }

@@ -70,11 +70,18 @@ export class Captions {
     this.scroll();
   }
 
-  /** The present line is the last one seen. */
+  /**
+   * What is higher than its place goes by pages, which turn with the first word of the next one. Only there all words
+   * of a page are seen at once, those that are still to come dimly: the last ones would go as soon as they are heard.
+   */
   private scroll(): void {
-    const { answered, nextWords, cut } = this;
+    const { answered, heardWords, cut } = this;
+    answered.classList.toggle('paged', answered.scrollHeight - answered.clientHeight > 1);
+    const last = [...heardWords.getClientRects()].at(-1);
+    const down = last ? last.top - answered.getBoundingClientRect().top + answered.scrollTop : 0;
     const line = parseFloat(getComputedStyle(answered).lineHeight);
-    answered.scrollTop = nextWords.offsetTop + line - answered.clientHeight;
+    const page = line * Math.max(1, Math.round(answered.clientHeight / line)); // pixels of the screen are too coarse
+    answered.scrollTop = Math.floor(down / page) * page;
     cut.hidden = answered.scrollTop < 1;
   }
 }

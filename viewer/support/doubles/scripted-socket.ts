@@ -1,4 +1,4 @@
-import { VERSION } from '../../src/protocol.ts';
+import { BEAT_SECONDS, VERSION } from '../../src/protocol.ts';
 
 /** A message that the page sent; of `audio` only what is not sound. */
 export type Sent = { type: string; at: number } & Record<string, unknown>;
@@ -13,6 +13,7 @@ export class ScriptedSocket {
   readonly sent: Sent[] = [];
   readonly url: string;
   closed = false;
+  beats = true; // as a server does, once it has welcomed
 
   constructor(url: string) {
     this.url = url;
@@ -49,6 +50,13 @@ export class ScriptedSocket {
     const services = { recognition: name, language: name, voice: name };
     const welcome = { type: 'welcome', version: VERSION, session: 'first', resumed: false, services, notices: [], dictation: null, offers: [], remembers: false };
     this.says({ ...welcome, ...more });
+    this.beat();
+  }
+
+  private beat(): void {
+    if (this.closed) return;
+    if (this.beats) this.onmessage?.({ data: JSON.stringify({ type: 'beat' }) });
+    setTimeout(() => this.beat(), 1000 * BEAT_SECONDS);
   }
 
   /** Says why and hangs up. */

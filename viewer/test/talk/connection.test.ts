@@ -1,4 +1,4 @@
-import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { Connection, type ConnectionEvents, type Ending } from '../../src/talk/connection.ts';
 import { say } from '../../src/words/text.ts';
 import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
@@ -11,6 +11,7 @@ beforeEach(() => {
   ScriptedSocket.all = [];
 });
 afterEach(() => {
+  vi.restoreAllMocks();
   vi.useRealTimers();
   vi.unstubAllGlobals();
 });
@@ -22,6 +23,7 @@ function connect() {
     message: () => {},
     welcome: ({ resumed }, replaced) => told.push(`welcome, resumed ${resumed}, replaced ${replaced}`),
     lost: () => told.push('lost'),
+    regained: () => told.push('regained'),
     queued: ({ position, seconds }) => told.push(`place ${position}, ${seconds} s`),
     stalled: () => {},
     ended: (ending) => endings.push(ending),
@@ -193,4 +195,81 @@ test('a place in the queue that the server has forgotten is no reason to give up
   expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null }]);
   ScriptedSocket.last.drop();
   expect(nextTry()).toBe(300);
+});
+
+describe('a network that has gone without a word', () => {
+  /** How long it takes until something is so, ms; not longer than two minutes. */
+  function waited(fulfilled: () => boolean): number {
+    const began = performance.now();
+    while (!fulfilled() && performance.now() - began < 120_000) vi.advanceTimersByTime(100);
+    return performance.now() - began;
+  }
+
+  function goSilent() {
+    const all = connect();
+    ScriptedSocket.last.welcome();
+    vi.advanceTimersByTime(60_300); // a talk in which nobody says anything
+    const first = ScriptedSocket.last;
+    first.beats = false;
+    return { ...all, first, after: waited(() => all.told.at(-1) === 'lost') };
+  }
+
+  test('is noticed within five seconds, and another line is tried at once; typed questions stay', () => {
+    const { connection, told, after } = goSilent();
+    expect(after).toBeLessThanOrEqual(4500);
+    expect(after).toBeGreaterThan(3000); // shorter gaps are usual
+    expect(told).toEqual(['welcome, resumed false, replaced false', 'lost']);
+    expect(ScriptedSocket.all).toHaveLength(2);
+    expect(connection.send({ type: 'text', text: 'Hello?' })).toBe(false);
+  });
+
+  test.each([6000, 14_000, 20_000])('costs nothing where it only stalled, for %i ms', (stall) => {
+    const { connection, told, first, endings, after } = goSilent();
+    vi.advanceTimersByTime(stall - after);
+    expect(told.filter((one) => one === 'lost')).toHaveLength(1);
+    first.beats = true;
+    vi.advanceTimersByTime(1000);
+    expect(told.at(-1)).toBe('regained');
+    expect(first.closed).toBe(false);
+    expect(ScriptedSocket.all.slice(1).map(({ closed }) => closed)).not.toContain(false);
+    expect(ScriptedSocket.all.slice(1).flatMap(({ sent }) => sent)).toEqual([]);
+    expect(connection.send({ type: 'text', text: 'Hello!' })).toBe(true);
+    expect(first.of('text')).toHaveLength(1);
+    expect(nextTry()).toBe(null);
+    expect(endings).toEqual([]);
+  });
+
+  test('is left for the first line that opens, which goes on with the session', () => {
+    const { told, first } = goSilent();
+    ScriptedSocket.last.drop(); // the first try finds no network
+    expect(nextTry()).toBe(300);
+    ScriptedSocket.last.welcome({ resumed: true });
+    expect(first.closed).toBe(true);
+    expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: 'first' }]);
+    expect(told.at(-1)).toBe('welcome, resumed true, replaced false');
+    expect(nextTry()).toBe(null);
+  });
+
+  test('is waited for no longer than a session, and then ends it as other drops do', () => {
+    const { endings, first } = goSilent();
+    const silent = waited(() => first.closed); // handshakes get no answer either
+    expect(silent).toBeGreaterThan(30_000);
+    expect(endings).toEqual([]);
+    const gone = waited(() => endings.length > 0);
+    expect(gone).toBeGreaterThan(30_000);
+    expect(silent + gone).toBeLessThan(90_000);
+    expect(endings).toMatchObject([{ sentence: say('unreachable'), again: true }]);
+  });
+
+  test('is not what a tab finds that slept', () => {
+    const { told } = connect();
+    ScriptedSocket.last.welcome();
+    ScriptedSocket.last.beats = false;
+    const now = performance.now.bind(performance);
+    vi.spyOn(performance, 'now').mockImplementation(() => now() + 3_600_000); // an hour passes in which no timer runs
+    for (let woken = 0; woken < 3; woken++) vi.advanceTimersToNextTimer();
+    ScriptedSocket.last.beats = true;
+    vi.advanceTimersByTime(30_000);
+    expect(told).toEqual(['welcome, resumed false, replaced false']);
+  });
 });

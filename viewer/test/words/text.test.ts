@@ -4,6 +4,7 @@ import { describe, expect, test } from 'vitest';
 import { foreignTo } from '../../src/words/foreign.ts';
 import { codeOf, english, isKey, languageOf, LANGUAGES, say, textOf, type Key, type Language } from '../../src/words/text.ts';
 import studio from '../../src/words/studio.json';
+import { serviceName } from '../../src/words/services.ts';
 import texts from '../../src/words/texts.json';
 
 const VIEWER = join(import.meta.dirname, '../..');
@@ -108,4 +109,19 @@ test.each([
   [[], 'en'],
 ])('whoever reads %j gets %s', (tags, language) => {
   expect(languageOf(tags)).toBe(language);
+});
+
+describe('the name of a service', () => {
+  const german = (name: string) => textOf(serviceName(name), 'de');
+
+  test('is in the page’s language where it describes', () => {
+    expect(german('persona notes')).toBe('Notizen zur Figur');
+    expect(german('a server on this machine (llama3 of Ollama)')).toBe('ein Server auf diesem Rechner (llama3 of Ollama)');
+    expect(textOf(serviceName('OpenAI-compatible server (gpt)'), 'ja')).toBe('OpenAI互換サーバー（gpt）');
+  });
+
+  test('stays where it is one of its own', () => {
+    expect(german('espeak-ng')).toBe('espeak-ng');
+    expect(german('Whisper (persona notes)')).toBe('Whisper (persona notes)');
+  });
 });

@@ -9,6 +9,7 @@ import tyro
 
 from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.common.device import DeviceName
+from ico3d.common.files import write_atomic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -348,5 +349,5 @@ def _watched(windows: "Iterator[WindowResult]", count: int, report: Report) -> "
 def _save_picture(picture, path: Path) -> None:
     from PIL import Image
 
-    path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(picture).save(path)
+    drawn = Image.fromarray(picture)
+    write_atomic(path, lambda temporary: drawn.save(temporary))

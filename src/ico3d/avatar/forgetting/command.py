@@ -41,7 +41,7 @@ class Forget:
         """
         from rich.console import Console
 
-        from ico3d.avatar.forgetting.choosing import belonging, outermost, remaining
+        from ico3d.avatar.forgetting.choosing import belonging, outermost, remaining, within
         from ico3d.avatar.forgetting.holdings import find_holdings
         from ico3d.avatar.forgetting.removal import remove, with_tracks
         from ico3d.errors import printable
@@ -54,8 +54,8 @@ class Forget:
         theirs = outermost([*with_tracks(paths), *(one.path for one in chosen)])
         if not theirs:
             raise self._nobody(holdings)
-        for path in theirs:
-            console.print(printable(f"{path}{_described(path, chosen)}"))
+        for path, inside in within(theirs, chosen).items():
+            console.print(printable(f"{path}{_described(inside)}"))
         self._ask(len(theirs))
         targets = remove(theirs)
         console.print(f"{len(theirs)} removed. What may remain elsewhere, and is not removed:")
@@ -106,9 +106,8 @@ class Forget:
             raise SettingsError("nothing was removed.")
 
 
-def _described(path: Path, chosen: "Sequence[Holding]") -> str:
-    """What is removed with a path, for people."""
-    inside = [one for one in chosen if one.lies_in(path)]
+def _described(inside: "Sequence[Holding]") -> str:
+    """What is removed with a path that holds these, for people."""
     names = dict.fromkeys(name for one in inside for name in one.likenesses)
     kinds = dict.fromkeys(one.what for one in inside)
     if not inside:

@@ -9,7 +9,7 @@ from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST, Manifest
 from ico3d.capture.writing.new_folder import UNFINISHED, is_unfinished
-from ico3d.common.files import read_object, walk
+from ico3d.common.files import LONGEST, read_object, walk
 from ico3d.common.people.stated import BETWEEN, NOBODY, alike, is_stated
 from ico3d.errors import Ico3dError
 
@@ -61,10 +61,6 @@ class Holding:
         """The people whom it shows, as names are compared; of synthetic people nobody."""
         return {alike(name) for name in self.likenesses if name != NOBODY}
 
-    def lies_in(self, path: Path) -> bool:
-        """Whether it is a path, or below it."""
-        return self.path.is_relative_to(path)
-
 
 def find_holdings(project: Path) -> list[Holding]:
     """Finds all that shows people in a folder and below it.
@@ -102,10 +98,11 @@ def _folder(folder: Path) -> Holding | None:
     if not any(models) and "capture" not in run:
         hidden = is_unfinished(folder.name)
         return Holding(folder, "an unfinished recording", ()) if hidden else None
-    made_of = [Path(run[name]) for name in MADE_OF if isinstance(run.get(name), str)]
+    stated = [text for name in MADE_OF if isinstance(text := run.get(name), str)]
+    made_of = [Path(text) for text in stated if len(text) < LONGEST]
     parts = [part for model in models if isinstance(part := model.get("summary"), dict)]
-    stated = [part.get(key, {}) for part in parts for key in ("capture", "head", "body")]
-    names = [about.get("likeness", "") for about in stated if isinstance(about, dict)]
+    shown = [part.get(key, {}) for part in parts for key in ("capture", "head", "body")]
+    names = [about.get("likeness", "") for about in shown if isinstance(about, dict)]
     what = "a model" if any(models) else "an unfinished training"
     return Holding(folder, what, _named(*map(str, names)), tuple(made_of))
 

@@ -133,6 +133,8 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
         if array is None or array.shape != shape:
             found = "nothing" if array is None else f"{array.shape}"
             raise CaptureError(f"{file}: '{name}' must be {shape}, found {found}: {mend}.")
+        if array.dtype.kind not in "fiu":
+            raise CaptureError(f"{file}: '{name}' holds no real numbers: {mend}.")
         if not np.isfinite(array).all():
             raise CaptureError(f"{file}: '{name}' holds NaN or infinity: {mend}.")
     return HeadTrack(**{name: arrays[name] for name in shapes})

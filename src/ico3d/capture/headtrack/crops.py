@@ -16,6 +16,8 @@ READ_AT = 384
 """Side in pixels of the pictures that MediaPipe gets."""
 HEAD = 0.48
 """Size in metres of the part around a head: twice the head's height."""
+LARGEST = 2
+"""Largest part around a head, as a factor of the picture's longer side."""
 STEPS = (1, 2, 4)
 """Sizes of searched parts: the whole person, a half and a quarter of the height."""
 FILLED = 0.05
@@ -67,12 +69,15 @@ def around(camera: Camera, center: np.ndarray, size: float = HEAD) -> Part | Non
         size: Diameter of the ball, metres.
 
     Returns:
-        The part, or None if the ball is outside of the picture or behind the camera.
+        The part, or None if the ball is outside of the picture or behind the camera, or so near
+        to it that the picture shows next to nothing of the ball.
     """
     pixel, depth = camera.project(center)
     if depth <= 0:
         return None
-    side = max(8, round(size * float(camera.intrinsics[0, 0] / depth)))
+    side = max(8, round(min(size * float(camera.intrinsics[0, 0] / depth), 1e9)))
+    if side > LARGEST * max(camera.width, camera.height):
+        return None
     part = Part(round(float(pixel[0]) - side / 2), round(float(pixel[1]) - side / 2), side)
     outside = part.left >= camera.width or part.top >= camera.height
     return None if outside or min(part.left, part.top) <= -side else part

@@ -21,6 +21,7 @@ from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface.first_points import unknown_person
 from ico3d.capture.vetting.claims import check_claimed
 from ico3d.common.camera import Camera
+from ico3d.common.files import read_small
 from ico3d.errors import CaptureError
 
 _NUMBER = re.compile("[0-9]{1,9}")
@@ -187,7 +188,8 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "au.csv"
         if not path.is_file():
             return None
-        header = _reading(path, path.read_text).split("\n", 1)[0].split(",")
+        text = _reading(path, lambda: read_small(path).decode())
+        header = text.split("\n", 1)[0].split(",")
         names = [name.strip() for name in header]
         missing = [name for name in AU_COLUMNS if name not in names]
         if missing:
@@ -195,7 +197,9 @@ class TalkingPortrait(RecordedCapture):
         wanted = [names.index(name) for name in AU_COLUMNS]
         table = _reading(
             path,
-            lambda: np.loadtxt(path, delimiter=",", skiprows=1, usecols=wanted, ndmin=2),
+            lambda: np.loadtxt(
+                text.splitlines(), delimiter=",", skiprows=1, usecols=wanted, ndmin=2
+            ),
         )
         return dict(zip(AU_COLUMNS, table.T, strict=True))
 

@@ -8,6 +8,8 @@ import numpy as np
 from ico3d.common.files import check_regular
 from ico3d.errors import CaptureError
 
+LARGEST = 1 << 28
+"""Bytes of an array: eleven million points."""
 UNREADABLE = (
     OSError,
     ValueError,
@@ -26,7 +28,8 @@ def read_numbers(file: Path) -> np.ndarray:
     """The array in a .npy file.
 
     Raises:
-        CaptureError: If the file holds none, or one of anything but real numbers.
+        CaptureError: If the file holds none, or a larger one than `LARGEST`, or one of anything but
+            real numbers.
     """
     try:
         check_regular(file)
@@ -38,4 +41,6 @@ def read_numbers(file: Path) -> np.ndarray:
         ) from error
     if not isinstance(mapped, np.ndarray) or mapped.dtype.kind not in "fiu":
         raise CaptureError(f"{file} is damaged and cannot be read: it holds no array of numbers.")
+    if mapped.nbytes > LARGEST:  # a file of zeros takes no room on a disk
+        raise CaptureError(f"{file} holds more than {LARGEST >> 20} MiB of numbers: too many.")
     return np.array(mapped)

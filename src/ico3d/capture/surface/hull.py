@@ -11,6 +11,7 @@ from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
 from ico3d.common.camera import Camera
+from ico3d.common.spread import spread
 
 LARGEST_MASK = 512
 """Longer side in pixels to which masks are reduced; more would be finer than any voxel."""
@@ -20,10 +21,16 @@ MOST_PARALLEL = 1e4
 """Condition number above which viewing directions count as parallel (less than a degree apart)."""
 WORTH_IGNORING = 0.01
 """A mask is bad if the hull without it fills this much more of the other masks."""
-CAMERAS_PER_BAD = 16
-"""One mask in this many may be bad; with four cameras or more, at least one."""
+CAMERAS_PER_BAD, MOST_BAD = 16, 4
+"""One mask in this many may be bad, up to so many; with four cameras or more, at least one."""
+MOST_SEEN = 100
+"""Silhouettes that are carved with, evenly chosen: more tell nothing new."""
 HELD, SURELY_HELD = 0.5, 0.7
 """Shares of the pictures that must show a voxel, and one of the voxels connected to it."""
+MOST_CELLS = 300
+"""Voxels along each side of the box; where cameras show more space, voxels are larger."""
+MOST_LOOKS = 24 * MOST_CELLS**3
+"""Voxels of the box times pictures, beyond which voxels are larger, too."""
 BISECTIONS = 4
 """Number of times that a voxel's edge is halved to locate the surface."""
 
@@ -76,22 +83,27 @@ def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
 
     Args:
         silhouettes: What cameras around the person saw at one moment.
-        edge: Edge of a voxel in metres; the surface is located to a sixteenth of that.
+        edge: Edge of a voxel in metres; the surface is located to a sixteenth of that. Cameras that
+            show more space than a person fills get larger voxels.
 
     Returns:
         The hull; None if the cameras do not look at one place from different sides.
     """
+    chosen = spread(len(silhouettes), MOST_SEEN)
+    silhouettes = [silhouettes[index] for index in chosen]
     box = looked_at([s.camera for s in silhouettes]) if len(silhouettes) > 1 else None
     if box is None:
         return None
     center, radius = box
-    cells = 2 * math.ceil(MARGIN * radius / edge)
+    most = min(MOST_CELLS, 2 * int((MOST_LOOKS / len(silhouettes)) ** (1 / 3) / 2))
+    edge = max(edge, 2 * MARGIN * radius / most)
+    cells = min(2 * math.ceil(MARGIN * radius / edge), most)
     origin = center - (cells - 1) / 2 * edge
     ignored = _bad(silhouettes, origin, edge, cells)
     stack = _Stack.of([s for index, s in enumerate(silhouettes) if index not in ignored])
     carved = _carve(origin, edge, cells, 0, *stack.arrays) == 0  # (cells, cells, cells)
     occupied = _connected(carved, _surely(carved, origin, edge, stack))
-    return Hull(_surface(occupied, origin, edge, stack), ignored)
+    return Hull(_surface(occupied, origin, edge, stack), tuple(chosen[index] for index in ignored))
 
 
 def looked_at(cameras: Sequence[Camera]) -> tuple[np.ndarray, float] | None:
@@ -107,7 +119,8 @@ def looked_at(cameras: Sequence[Camera]) -> tuple[np.ndarray, float] | None:
         * max(camera.width / camera.intrinsics[0, 0], camera.height / camera.intrinsics[1, 1])
         for camera in cameras
     ]
-    return middle, float(np.median(widths)) / 2
+    radius = float(np.median(widths)) / 2
+    return (middle, radius) if math.isfinite(radius) else None
 
 
 def focus(cameras: Sequence[Camera]) -> np.ndarray | None:
@@ -122,7 +135,7 @@ def focus(cameras: Sequence[Camera]) -> np.ndarray | None:
     axes = (poses[:, :3, :3] @ inverses @ middles[:, :, None])[:, :, 0]  # (C, 3)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     across = np.eye(3) - axes[:, :, None] * axes[:, None]  # (C, 3, 3)
-    if np.linalg.cond(across.sum(0)) > MOST_PARALLEL:
+    if not np.isfinite(across).all() or np.linalg.cond(across.sum(0)) > MOST_PARALLEL:
         return None
     return np.linalg.solve(across.sum(0), (across @ poses[:, :3, 3:]).sum(0))[:, 0]
 
@@ -168,7 +181,7 @@ def _bad(
 ) -> tuple[int, ...]:
     """Numbers of the silhouettes that contradict all others, at half the resolution."""
     count = len(silhouettes)
-    allowed = 0 if count < 4 else max(1, count // CAMERAS_PER_BAD)
+    allowed = 0 if count < 4 else min(max(1, count // CAMERAS_PER_BAD), MOST_BAD)
     stack = _Stack.of(silhouettes)
     origin, edge = origin + edge / 2, 2 * edge
     voxels = np.argwhere(_carve(origin, edge, cells // 2, allowed, *stack.arrays) <= allowed)
@@ -202,7 +215,8 @@ class _Filling:
         pixels, depths = camera.project(centers)  # (V, 2), (V,)
         self._front = depths > 0
         depth = float(np.median(depths[self._front])) if self._front.any() else 1.0
-        side = max(1, math.ceil(edge * float(camera.intrinsics[[0, 1], [0, 1]].max()) / depth))
+        wide = edge * float(camera.intrinsics[[0, 1], [0, 1]].max()) / depth
+        side = max(1, math.ceil(min(wide, max(silhouette.mask.shape))))
         rows, columns = (-(-size // side) for size in silhouette.mask.shape)
         padded = np.zeros((rows * side, columns * side), bool)
         padded[: silhouette.mask.shape[0], : silhouette.mask.shape[1]] = silhouette.mask

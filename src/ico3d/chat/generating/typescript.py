@@ -25,6 +25,7 @@ CONSTANTS = {
     "SPEECH_RATE": "Hz",
     "EXPRESSION_FPS": "rows per second",
     "RESUME_SECONDS": "",
+    "BEAT_SECONDS": "",
 }
 """What the page uses, with its unit."""
 
@@ -111,7 +112,7 @@ def translated(annotation: Any) -> str:
 
 def union(name: str, kinds: tuple[type, ...]) -> str:
     """A union type of messages."""
-    return f"export type {name} =\n" + "\n".join(f"  | {exported(k)}" for k in kinds) + ";\n"
+    return f"export type {name} = {' | '.join(map(exported, kinds))};\n"
 
 
 def server_types() -> str:

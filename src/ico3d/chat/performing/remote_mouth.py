@@ -1,8 +1,10 @@
 """Client of a remote expression module; falls back to the local speech model."""
 
+import contextlib
+import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 from loguru import logger
@@ -20,6 +22,9 @@ from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
 AVOIDED = 20.0  # s for which a server that failed is not asked again
+ROW_SAMPLES = SPEECH_RATE // EXPRESSION_FPS
+SPARE_ROWS = 8
+"""Rows that an answer may have beyond the sound: a very short sound has six."""
 FAILURES = (OSError, WebSocketException, Ico3dError, ValueError, RecursionError)
 """TimeoutError is an OSError; JSON may be nested too deep."""
 
@@ -50,13 +55,20 @@ class RemoteMouth:
         self._avoided_until = float("-inf")
 
     def lips(self) -> "RemoteLips":
-        """A new object for the mouth of one sentence."""
-        with self._lock:
-            self._sentence += 1
-            return RemoteLips(self, self._sentence)
+        """A new object for the mouth of one sentence; nothing that is under way is waited for."""
+        self._sentence += 1
+        return RemoteLips(self, self._sentence)
 
-    def ask(self, sentence: int, message: bytes | str, is_first: bool) -> np.ndarray:
+    def ask(
+        self, sentence: int, message: bytes | str, is_first: bool, fitting: range
+    ) -> np.ndarray:
         """Sends a message of a sentence; returns the rows (n, C) of the answer.
+
+        Args:
+            sentence: Number of the sentence.
+            message: The message.
+            is_first: Whether it is the first one of the sentence.
+            fitting: How many rows the answer may have.
 
         Raises:
             OSError: If the module does not answer, or not in time.
@@ -69,7 +81,7 @@ class RemoteMouth:
             if self._now() < self._avoided_until:
                 raise ServiceError("it failed a moment ago.")
             try:
-                return self._exchange(message, is_first)
+                return self._exchange(message, is_first, fitting)
             except FAILURES as error:
                 self._avoided_until = self._now() + AVOIDED
                 self._hang_up()
@@ -81,15 +93,18 @@ class RemoteMouth:
         with self._lock:
             self._hang_up()
 
-    def _exchange(self, message: bytes | str, is_first: bool) -> np.ndarray:
-        socket = self._socket = self._socket or self._connected()
-        if is_first:
-            socket.send(START)
-        socket.send(message)
-        answer = socket.recv(self._settings.timeout)
+    def _exchange(self, message: bytes | str, is_first: bool, fitting: range) -> np.ndarray:
+        line = self._socket or self._connected()
+        with _sending(line, self._settings.timeout):
+            if is_first:
+                line.send(START)
+            line.send(message)
+        answer = line.recv(self._settings.timeout)
         if isinstance(answer, str) or len(answer) % (ROW.itemsize * SPEECH_SIZE):
             raise ServiceError("its answer is no rows.")
         rows = np.frombuffer(answer, ROW).reshape(-1, SPEECH_SIZE).astype(np.float32)
+        if len(rows) not in fitting:
+            raise ServiceError("its answer does not have as many rows as the sound.")
         if not np.isfinite(rows).all():
             raise ServiceError("its rows are not finite.")
         return rows
@@ -97,14 +112,14 @@ class RemoteMouth:
     def _connected(self) -> ClientConnection:
         settings = self._settings
         key = key_for(settings.url, settings.key_variable, "chat settings: [expression]")
-        socket = connect(
+        line = self._socket = connect(
             settings.url.replace("http", "ws", 1).rstrip("/") + PATH,
             additional_headers={"Authorization": f"Bearer {key}"} if key else {},
             open_timeout=settings.timeout,
             close_timeout=settings.timeout,
             proxy=None,
         )
-        hello = loose_json(socket.recv(settings.timeout))
+        hello = loose_json(line.recv(settings.timeout))
         own = {
             "model": self._sha256,
             "rate": SPEECH_RATE,
@@ -112,14 +127,30 @@ class RemoteMouth:
             "size": SPEECH_SIZE,
         }
         if hello != own:
-            socket.close()
             raise ServiceError("it serves another avatar's model: start it with this --bundle.")
-        return socket
+        return line
 
     def _hang_up(self) -> None:
-        socket, self._socket = self._socket, None
-        if socket is not None:
-            threading.Thread(target=socket.close, daemon=True).start()  # it may wait for an answer
+        line, self._socket = self._socket, None
+        if line is not None:
+            threading.Thread(target=line.close, daemon=True).start()  # it may wait for an answer
+
+
+@contextlib.contextmanager
+def _sending(line: ClientConnection, seconds: float) -> Generator[None, None, None]:
+    """Cuts a line whose other end does not take what is sent: that has no time limit of its own."""
+    cut = threading.Timer(seconds, _cut, (line,))
+    cut.daemon = True
+    cut.start()
+    try:
+        yield
+    finally:
+        cut.cancel()
+
+
+def _cut(line: ClientConnection) -> None:
+    with contextlib.suppress(OSError):  # it was lost just now
+        socket.socket.shutdown(line.socket, socket.SHUT_RDWR)  # of TLS, too, without a last word
 
 
 class RemoteLips:
@@ -157,10 +188,15 @@ class RemoteLips:
 
     def _asked(self, message: bytes | str, is_first: bool) -> np.ndarray:
         try:
-            rows = self._mouth.ask(self._sentence, message, is_first)
+            rows = self._mouth.ask(self._sentence, message, is_first, self._fitting(message))
         except FAILURES:
             # from the sentence's start, for a row depends on what was before it
             self._own = StreamingExpressions(self._mouth.model, SPEECH_RATE)
             rows = self._own.push(self._samples)[self._given :]
         self._given += len(rows)
         return rows
+
+    def _fitting(self, message: bytes | str) -> range:
+        """How many rows the answer to a message may have; after the last one, none are missing."""
+        missing = len(self._samples) // ROW_SAMPLES - self._given
+        return range(missing if message == FINISH else 0, missing + SPARE_ROWS + 1)

@@ -14,7 +14,16 @@ from ico3d.chat.serving.sessions import HastyError, RestlessError, Session, Sess
 from ico3d.chat.serving.waiting import ClosedError, FullError, Ticket
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
-from ico3d.chat.wire.protocol import Ack, Error, Hello, Notice, Welcome
+from ico3d.chat.wire.protocol import (
+    BEAT_SECONDS,
+    Ack,
+    Beat,
+    Error,
+    Hello,
+    Notice,
+    ServerMessage,
+    Welcome,
+)
 from ico3d.chat.wire.sentences import (
     CROWDED,
     ELSEWHERE,
@@ -210,7 +219,7 @@ class Connection:
     async def _write(self) -> None:
         """Sends until the outbox is closed, which ends the connection too."""
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # the page is gone
-            while (message := await self._outbox.get()) is not None:
+            while (message := await self._next()) is not None:
                 try:
                     frame = encode(message)
                 except ProtocolError as error:  # one message less, and the conversation goes on
@@ -221,6 +230,14 @@ class Connection:
                 else:
                     await self._socket.send_bytes(frame)
             await self._socket.close(GOING)
+
+    async def _next(self) -> ServerMessage | None:
+        """What is to be sent next, a beat if there is nothing else; None if nothing more comes."""
+        try:
+            async with asyncio.timeout(BEAT_SECONDS):
+                return await self._outbox.get()
+        except TimeoutError:
+            return Beat()
 
     async def _break_off(self, error: Exception) -> None:
         """A fault of ours: the page is told, and does not come back to the same again."""

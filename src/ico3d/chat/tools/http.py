@@ -4,17 +4,20 @@ Only listed hosts are called, at addresses that are public or listed themselves;
 on the same host, and so do headers; time and size are limited.
 """
 
+import asyncio
 import contextlib
 import ipaddress
 import json
 import socket
 from collections.abc import Mapping
+from functools import partial
 from itertools import accumulate
 from typing import Any
 from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
 import aiohttp
 from aiohttp.abc import AbstractResolver, ResolveResult
+from aiohttp.client_proto import ResponseHandler
 from aiohttp.resolver import DefaultResolver
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.services.llm_service import FunctionCallParams
@@ -26,7 +29,9 @@ from ico3d.common.typed import loose_json
 from ico3d.errors import SettingsError
 
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
+TOO_LONG = f"its answer has more than {MOST_BYTES} bytes"
 MOST_DEPTH = 100  # of an answer as JSON: what sends it on has less room than what parses it
+MOST_RECEIVED = 4 * MOST_BYTES  # of a connection: heads of answers, which may be many, count, too
 MOST_REDIRECTS = 3
 REDIRECTS = (301, 302, 303, 307, 308)
 GLOBAL, NAT64 = ipaddress.ip_network("2000::/3"), ipaddress.ip_network("64:ff9b::/96")
@@ -57,6 +62,32 @@ class CheckedResolver(AbstractResolver):
     async def close(self) -> None:
         """Closes the underlying resolver."""
         await self._resolver.close()
+
+
+class BoundedConnector(aiohttp.TCPConnector):
+    """Connections of which no more than `MOST_RECEIVED` bytes are parsed."""
+
+    def __init__(self, resolver: AbstractResolver):
+        """Asks `resolver` for addresses."""
+        super().__init__(resolver=resolver)
+        self._factory = partial(_BoundedAnswers, loop=self._loop)
+
+
+class _BoundedAnswers(ResponseHandler):
+    """One connection; `100 Continue` and the like may come before an answer without an end."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop):
+        super().__init__(loop)
+        self._room = MOST_RECEIVED
+
+    def data_received(self, data: bytes) -> None:
+        """Parses bytes, unless they are too many."""
+        self._room -= len(data)
+        if self._room >= 0:
+            super().data_received(data)
+        elif self.transport is not None:
+            self.set_exception(Refused(TOO_LONG))
+            self.transport.close()
 
 
 def check_address(address: str, host: str, port: int, allow: tuple[str, ...]) -> None:
@@ -147,7 +178,7 @@ async def _fetch(
 ) -> dict[str, Any]:
     url, options = request
     home = urlsplit(tool.url)
-    connector = aiohttp.TCPConnector(resolver=CheckedResolver(allow))
+    connector = BoundedConnector(CheckedResolver(allow))
     limit = aiohttp.ClientTimeout(total=tool.seconds)
     cookies = aiohttp.DummyCookieJar()
     async with aiohttp.ClientSession(
@@ -184,7 +215,7 @@ async def _body(tool: Tool, response: aiohttp.ClientResponse) -> Any:
     async for part in response.content.iter_chunked(MOST_BYTES):
         data += part
         if len(data) > MOST_BYTES:
-            raise Refused(f"its answer has more than {MOST_BYTES} bytes")
+            raise Refused(TOO_LONG)
     text = blanked(data.decode("utf-8", "replace"), tool.headers, tool.where)
     if _depth(text) > MOST_DEPTH:
         return text

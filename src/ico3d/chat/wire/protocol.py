@@ -23,7 +23,7 @@ from ico3d.chat.wire.protocol_gestures import MAX_CUES, Cue, Release
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
 from ico3d.chat.wire.protocol_visits import Error, Hello, Notes, Notice, Place, Welcome
 
-VERSION = 8
+VERSION = 9
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
@@ -33,6 +33,7 @@ MAX_BINARY_FRAME = 64 * 1024  # bytes
 MAX_RATE = 100  # messages per second a client may send for long
 MAX_BURST = 200  # messages it may send at once
 RESUME_SECONDS = 30  # how long a session waits for its page to come back
+BEAT_SECONDS = 1.0  # after which a line that carries nothing else carries a beat
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
 MAX_QUESTION = 2000  # characters of a question, however it is asked
 MAX_ARGUMENTS = 4000  # characters of a function's arguments
@@ -162,6 +163,15 @@ class Ack:
     """
 
     frames: Count
+
+
+@dataclass(frozen=True)
+class Beat:
+    """The line is up; sent from `welcome` on wherever nothing else was sent for a second.
+
+    Nobody tells a browser of a network that has gone without a word. A page that hears nothing for
+    some seconds says so and tries another connection.
+    """
 
 
 @dataclass(frozen=True)
@@ -355,6 +365,7 @@ ServerMessage = (
     Welcome
     | Place
     | Ack
+    | Beat
     | State
     | Transcript
     | Answer

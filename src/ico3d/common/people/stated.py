@@ -1,6 +1,6 @@
 """Which statements about a recorded person were made: whose likeness, consent, licence."""
 
-import unicodedata
+from ico3d.common.people.spelling import spelled
 
 NOT_STATED = "not stated"
 NOBODY = "nobody: no such person exists"
@@ -16,4 +16,4 @@ def is_stated(text: str) -> bool:
 
 def alike(name: str) -> str:
     """A name as names are compared: in whichever case and form of Unicode they are written."""
-    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+    return spelled("NFC", spelled("NFC", name).casefold())

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import medfilt
 
 from ico3d.measure.sync.network import SIDE
 
@@ -92,6 +91,8 @@ class Crops:
 
     def __init__(self, track: Track):
         """Takes the track."""
+        from scipy.signal import medfilt  # takes long to import
+
         width, height = (track.boxes[:, 2:] - track.boxes[:, :2]).T
         middle = (track.boxes[:, :2] + track.boxes[:, 2:]) / 2  # (T, 2)
         series = (np.maximum(width, height) / 2, middle[:, 0], middle[:, 1])

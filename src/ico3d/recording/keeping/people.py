@@ -5,13 +5,13 @@ import logging
 import re
 import secrets
 import shutil
-import unicodedata
 from datetime import date
 from pathlib import Path
 
 from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
 from ico3d.common.files import write_atomic
+from ico3d.common.people.spelling import spelled
 from ico3d.creating.settings import OWN_USE
 from ico3d.errors import SettingsError
 from ico3d.recording.keeping.person import (
@@ -148,7 +148,7 @@ def checked_name(name: str) -> str:
     Raises:
         Refused: If it is none.
     """
-    name = unicodedata.normalize("NFC", name).strip()
+    name = spelled("NFC", name).strip()
     if not NAME.fullmatch(name):
         raise bad_name()
     return name

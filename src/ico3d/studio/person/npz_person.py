@@ -40,6 +40,8 @@ MATERIAL_BELOW = {
 """Materials of garments that only a whole person wears."""
 LARGEST = 1 << 28
 """Bytes of all arrays as numbers of 64 bits; 53 blendshapes of 27,000 vertices would take 34 MB."""
+MOST_VERTICES = 1 << 19
+"""Vertices that are read; the files have 44,000."""
 BUST_DEPTH = 0.55
 """Distance below the eyes at which a bust ends, metres; no camera of the head rig sees lower."""
 
@@ -105,6 +107,7 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
         raise CaptureError(f"there is no subject file {path}: name an .npz file, or 'anny'.")
     try:
         arrays = read_npz(path, LARGEST)
+        _check_sizes(arrays)
         subject = without_covered_neck(_subject(path.stem, arrays, whole))
         coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
         return smoothed(_with_turning_eyes(subject), np.isin(subject.materials, coarse))
@@ -112,6 +115,19 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:
         raise CaptureError(f"the subject file {path} cannot be read: {error}.") from error
+
+
+def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
+    """Refuses what would fill the memory: each shape and joint gets a row of all vertices.
+
+    Raises:
+        ValueError: If there are too many.
+    """
+    vertices, shapes, joints = (len(arrays[n]) for n in ("verts", "bs_names", "joint_names"))
+    if vertices > MOST_VERTICES or vertices * max(12 * shapes, 4 * joints) > LARGEST:
+        raise ValueError(
+            f"{shapes} shapes and {joints} joints of {vertices} vertices are more than is taken"
+        )
 
 
 def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:

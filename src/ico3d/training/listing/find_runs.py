@@ -11,7 +11,7 @@ from typing import Literal
 
 from ico3d.common.files import read_object, walk
 from ico3d.errors import ModelError
-from ico3d.training.log import METRICS, latest_entry
+from ico3d.training.log import METRICS, is_step, latest_entry
 from ico3d.training.notes.lock import is_locked
 from ico3d.training.notes.state import STATE, RunState, read_state
 from ico3d.training.run import CHECKPOINTS, FINISHED, SETTINGS, checkpoint_state, usable_step
@@ -272,4 +272,4 @@ def _expected(about: dict, kind: str) -> int | None:
     """The number of steps that settings tell: bodies have more than one training."""
     settings = about.get("settings")
     steps = settings.get("steps") if isinstance(settings, dict) else None
-    return steps if kind in ("head", "scene") and isinstance(steps, int) else None
+    return steps if kind in ("head", "scene") and is_step(steps) else None

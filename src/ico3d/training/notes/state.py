@@ -11,6 +11,7 @@ from typing import Any
 
 from ico3d.common.files import read_object, write_atomic
 from ico3d.errors import Ico3dError, StorageError
+from ico3d.training.log import is_step
 
 STATE = "state.json"
 
@@ -105,7 +106,7 @@ def read_state(folder: Path) -> RunState:
             tuple(map(str, told["command"])),
             str(told["folder"]),
             str(told["path"]),
-            None if told["steps"] is None else int(told["steps"]),
+            told["steps"] if is_step(told["steps"]) else None,
             None if told["failed"] is None else str(told["failed"]),
             bool(told["done"]),
         )

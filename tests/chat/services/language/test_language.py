@@ -3,6 +3,7 @@
 import asyncio
 import json
 import re
+import threading
 
 import numpy as np
 import pytest
@@ -15,13 +16,14 @@ from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, local, openai
 from ico3d.chat.services.language.compatible import MOST_ROUNDS
 from ico3d.chat.services.language.instruction import instruction
-from ico3d.chat.services.language.servers import first_server
+from ico3d.chat.services.language.servers import first_server, language_models
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings.conversation import ChatSettings, Choice, Memory
 from ico3d.chat.settings.tools import Tool
 from ico3d.chat.wire.protocol import Answer, End, Interrupt, Speech, State, Stop, Text, Timeline
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import SettingsError
+from support.chat.dripping import dripping
 from support.chat.pages import FollowingPlayer
 from support.chat.scripted_server import Call, Script, running
 from support.chat.scripted_talk import ADA, ask, roles, talking
@@ -264,6 +266,16 @@ async def test_what_is_no_language_model_is_not_taken_for_one(monkeypatch):
         began = asyncio.get_running_loop().time()
         assert await asyncio.to_thread(first_server, urls, 0.25) is None
         assert asyncio.get_running_loop().time() - began < 5  # of one that never ends
+
+
+def test_a_server_whose_answer_drips_is_not_waited_for():
+    with dripping(b"HTTP/1.1 200 OK\r\nX-Long: ") as port:
+        asked = threading.Thread(
+            target=language_models, args=(f"http://127.0.0.1:{port}/v1", "none", 0.25), daemon=True
+        )
+        asked.start()
+        asked.join(5)
+        assert not asked.is_alive()
 
 
 def test_a_paid_cloud_is_never_the_default(monkeypatch):

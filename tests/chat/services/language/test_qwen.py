@@ -196,5 +196,6 @@ async def test_our_pipeline_talks_with_transformers_serve(bundle, served_model):
             await page.wait(End, where=lambda m, n=utterance: m.utterance == n)
         said = [m.text for m in page.messages(Answer) if m.utterance == 2]
         await page.close()
-    print(f"transformers serve said: {said}; it offers {language_models(url, 'none', 5.0)}")
+    offered = await asyncio.to_thread(language_models, url, "none", 5.0)
+    print(f"transformers serve said: {said}; it offers {offered}")
     assert said == ["My name is Ada.", "Nice to meet you, dear visitor!"]

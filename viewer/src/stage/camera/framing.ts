@@ -7,6 +7,7 @@ export interface Picture {
   aspect: number; // width / height
   free: number; // share of the height, from above, that neither controls nor captions lie on
   clear?: number; // the same without captions, which may lie on legs; `free` where it is not known
+  top?: number; // share of the height, from above, on which words lie so near that heads keep clear of them
 }
 
 /** Where the camera stands for a picture. */
@@ -72,20 +73,21 @@ function composition(
   { crown, lowest }: Sitter,
   { line: wantedLine, height, width }: Shot,
   slope: number,
-  { aspect, free }: Picture,
+  { aspect, free, top = 0 }: Picture,
 ): { tilt: number; distance: number } {
   const above = crown + ABOVE;
-  const line = Math.min(wantedLine, (free * above) / (above + CHIN));
+  const high = Math.max(height, width / aspect); // m of the picture, from above, at her place
+  const line = Math.min(Math.max(wantedLine, top && top + above / high), top + ((free - top) * above) / (above + CHIN));
   const tilt = (1 - 2 * line) * slope;
   // Angles between the ray to the eyes and those to the edges.
   const [edge, down] = [Math.atan(slope), Math.atan(tilt)];
-  const [toTop, toBottom, toControls] = [edge - down, edge + down, Math.atan((2 * free - 1) * slope) + down];
+  const [toTop, toBottom, toControls] = [Math.atan((1 - 2 * top) * slope) - down, edge + down, Math.atan((2 * free - 1) * slope) + down];
   const least = Math.max(
     above / Math.tan(toTop),
     CHIN / Math.tan(toControls),
     FACE / (2 * aspect * slope * Math.cos(down)),
   );
-  const wanted = Math.max(height, width / aspect) / (2 * slope);
+  const wanted = high / (2 * slope);
   const nothingUnder = toBottom < Math.PI / 2 ? lowest / Math.tan(toBottom) : 0;
   return { tilt, distance: Math.max(least, Math.min(wanted, nothingUnder)) };
 }

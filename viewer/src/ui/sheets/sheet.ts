@@ -1,5 +1,6 @@
 import type { Offer, Services } from '../../protocol.ts';
 import type { PageWords } from '../../words/page-words.ts';
+import { serviceName } from '../../words/services.ts';
 import { say } from '../../words/text.ts';
 import { byId } from '../elements.ts';
 
@@ -37,7 +38,7 @@ export class ServiceSheet {
     const summary = document.createElement('summary');
     this.words.write(summary, say('services.others'));
     const lists = KINDS.flatMap((kind) => {
-      const items = missing.filter((offer) => offer.kind === kind).map((offer) => told(document.createElement('li'), offer));
+      const items = missing.filter((offer) => offer.kind === kind).map((offer) => this.told(document.createElement('li'), offer));
       if (items.length === 0) return [];
       const list = document.createElement('ul');
       list.append(...items);
@@ -65,24 +66,25 @@ export class ServiceSheet {
     input.checked = chosen;
     input.onchange = () => this.choose(offer);
     row.append(input);
-    return told(row, offer);
+    return this.told(row, offer);
+  }
+
+  /** A row with a service's name, and with what prevents it. */
+  private told<T extends HTMLElement>(row: T, { name, hindrance }: Offer): T {
+    const title = document.createElement('span');
+    this.words.write(title, serviceName(name));
+    row.append(title);
+    if (hindrance) {
+      const hint = document.createElement('small');
+      hint.lang = 'en'; // commands and settings, for whoever runs the server
+      hint.textContent = hindrance;
+      row.append(hint);
+    }
+    return row;
   }
 }
 
 /** Two lists: what fulfils a condition, and the rest. */
 function split<T>(all: readonly T[], fulfils: (one: T) => boolean): [T[], T[]] {
   return [all.filter(fulfils), all.filter((one) => !fulfils(one))];
-}
-
-/** A row with a service's name, and with what prevents it. */
-function told<T extends HTMLElement>(row: T, { name, hindrance }: Offer): T {
-  const title = document.createElement('span');
-  title.textContent = name;
-  row.append(title);
-  if (hindrance) {
-    const hint = document.createElement('small');
-    hint.textContent = hindrance;
-    row.append(hint);
-  }
-  return row;
 }

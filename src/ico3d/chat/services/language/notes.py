@@ -3,7 +3,6 @@
 import itertools
 import math
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy as np
 
 from ico3d.bundle.persona import Persona
 from ico3d.chat.services.language.index import Index
+from ico3d.common.people.spelling import spelled
 from ico3d.motion.composing.lexicon import requested
 
 CONFIDENT = 0.42  # score from which a note is taken as the answer
@@ -202,7 +202,7 @@ def _topics(topics: tuple[str, ...]) -> Topics:
 
 def heard(question: str) -> str:
     """As much of a question as is compared with notes; one letter may stand for eighteen."""
-    return unicodedata.normalize("NFKC", question[:MOST_LETTERS])[:MOST_LETTERS]
+    return spelled("NFKC", question[:MOST_LETTERS])[:MOST_LETTERS]
 
 
 def parse_note(text: str) -> Note | None:
@@ -216,7 +216,7 @@ def parse_note(text: str) -> Note | None:
 
 def plain(text: str) -> str:
     """Normalises a text: lower case, contractions expanded, letters and digits, single spaces."""
-    text = unicodedata.normalize("NFKC", text).casefold().replace("’", "'")
+    text = spelled("NFKC", text).casefold().replace("’", "'")
     for pattern, full in CONTRACTIONS:
         text = re.sub(pattern, full, text)
     return " ".join(re.findall(r"\w+", text))

@@ -1,7 +1,7 @@
 """Lists the models of OpenAI-compatible servers, with a time limit."""
 
+import asyncio
 import re
-import time
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
@@ -23,7 +23,7 @@ def language_models(url: str, key: str, seconds: float) -> list[str]:
         seconds: Time limit.
     """
     try:
-        listed = loose_json(_read(url.rstrip("/") + "/models", key, seconds))
+        listed = loose_json(asyncio.run(_read(url.rstrip("/") + "/models", key, seconds)))
     except (httpx.HTTPError, httpx.InvalidURL, TimeoutError, ValueError):
         return []
     entries = listed.get("data") if isinstance(listed, dict) else None
@@ -48,18 +48,26 @@ def first_server(urls: list[str], seconds: float) -> tuple[str, str] | None:
     return None
 
 
-def _read(url: str, key: str, seconds: float) -> bytes:
-    """An answer, read until it is too long or too slow; nothing leads elsewhere."""
-    until = time.monotonic() + seconds
+async def _read(url: str, key: str, seconds: float) -> bytes:
+    """An answer; nothing leads elsewhere, and nothing is unpacked.
+
+    Raises:
+        HTTPError: If there is none.
+        TimeoutError: If it is too long, or is not whole in time, however its head drips.
+    """
     data = b""
-    headers = {"Authorization": f"Bearer {key}"}
+    headers = {"Authorization": f"Bearer {key}", "Accept-Encoding": "identity"}
     secure = url.startswith("https:")  # else certificates would be read for nothing, which is slow
     options: dict[str, Any] = {"timeout": seconds, "trust_env": False, "headers": headers}
-    with httpx.stream("GET", url, verify=secure, **options) as response:
+    async with (
+        asyncio.timeout(seconds),
+        httpx.AsyncClient(verify=secure, **options) as http,
+        http.stream("GET", url) as response,
+    ):
         response.raise_for_status()
-        for part in response.iter_bytes():
+        async for part in response.aiter_raw():
             data += part
-            if len(data) > MOST_BYTES or time.monotonic() > until:
+            if len(data) > MOST_BYTES:
                 raise TimeoutError
     return data
 

@@ -1,4 +1,4 @@
-import { MICROPHONE_RATE, type AudioMessage, type TalkMessage } from '../protocol.ts';
+import { MICROPHONE_RATE, type AudioMessage, type TalkMessage } from '../../protocol.ts';
 
 const MOST_IN_FLIGHT = 0.6 * MICROPHONE_RATE; // samples: a round trip longer than that loses sound
 const MOST_WAITING = 0.4 * MICROPHONE_RATE;
