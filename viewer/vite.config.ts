@@ -1,6 +1,7 @@
 import { defineConfig } from 'vitest/config';
 import { compressed } from './compression.ts';
 import { preloaded } from './preloading.ts';
+import { PATIENCE } from './support/patience.ts';
 import { webAssembly } from './webassembly.ts';
 
 // `npm run dev` shows the page against a running `ico3d serve … --port 8700`.
@@ -39,8 +40,9 @@ export default defineConfig({
   test: {
     globalSetup: 'support/scratch.ts',
     isolate: false, // loading three and Spark anew for each file takes longer than most of the tests
-    testTimeout: 120_000, // a machine with other work is slow, not wrong
-    hookTimeout: 120_000,
+    testTimeout: 3 * PATIENCE,
+    hookTimeout: 3 * PATIENCE,
+    expect: { poll: { timeout: PATIENCE, interval: 100 } },
     projects: [
       { extends: true, test: { name: 'unit', include: ['test/**/*.test.ts'] } },
       {
@@ -70,7 +72,6 @@ export default defineConfig({
           include: ['bench/pictures/*.spec.ts'],
           globalSetup: ['support/scratch.ts', 'support/servers/shared.ts'],
           maxWorkers: 1,
-          testTimeout: 240_000,
         },
       },
       {

@@ -2,6 +2,7 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { makeBody } from '../support/references/body.ts';
+import { playByPictures } from '../support/browser/drawing.ts';
 import type { Playback } from '../src/motion/playback.ts';
 import { drawnBy } from '../support/browser/path.ts';
 import { psnr, takePixels, worst } from '../support/browser/pictures.ts';
@@ -45,21 +46,6 @@ afterAll(async () => {
   await browser?.close();
   await server?.stop();
 });
-
-/** Time on the page passes by the pictures that are drawn, so that a busy machine plays slowly instead of stalling. */
-async function playByPictures(): Promise<void> {
-  await page.addInitScript(() => {
-    const LONGEST = 1000 / 30; // ms from one picture to the next
-    let [time, last] = [0, 0];
-    const request = window.requestAnimationFrame.bind(window);
-    window.requestAnimationFrame = (draw) =>
-      request((now) => {
-        time += Math.min(now - last, LONGEST);
-        last = now;
-        draw(time);
-      });
-  });
-}
 
 /** Keeps what every further picture shows, and the pictures themselves. */
 function watch(): Promise<void> {
@@ -107,7 +93,7 @@ describe('a body alone, served by ico3d serve', () => {
   });
 
   test('plays there and back through all borders without a stall', async () => {
-    await playByPictures();
+    await playByPictures(page);
     await page.reload();
     await page.waitForFunction(() => window.ico3d !== undefined);
     await watch();
@@ -116,8 +102,6 @@ describe('a body alone, served by ico3d serve', () => {
         const windows = window.sights!.map((sight) => sight.window);
         return windows.includes(2) && windows.lastIndexOf(2) < windows.lastIndexOf(0);
       },
-      undefined,
-      { timeout: 120_000 },
     );
     const sights = await page.evaluate(() => window.sights!);
     expect(sights.filter(({ waiting }) => waiting)).toEqual([]);
@@ -149,6 +133,8 @@ describe('a body alone, served by ico3d serve', () => {
       stage.start();
       for (const time of [seconds + 1e-5, seconds - 1e-5]) {
         await body!.show(time);
+        const { window: shown } = body!.shown!;
+        while (window.sights!.at(-1)?.window !== shown) await new Promise(requestAnimationFrame);
         await new Promise((resolve) => setTimeout(resolve, 700)); // and the pictures of later sorts
       }
       return { sights: window.sights!, likeness: window.pictures!.map((picture) => window.psnr!(picture, before)) };
@@ -215,10 +201,10 @@ describe('a body alone, served by ico3d serve', () => {
       await route.continue();
     });
     await page.reload();
-    await page.waitForFunction(() => window.ico3d?.body?.shown?.waiting, undefined, { timeout: 30_000 });
+    await page.waitForFunction(() => window.ico3d?.body?.shown?.waiting);
     expect(await page.evaluate(() => window.ico3d!.body!.shown)).toMatchObject({ time: 1, window: 0 });
     release();
-    await page.waitForFunction(() => window.ico3d!.body!.shown!.window === 1, undefined, { timeout: 30_000 });
+    await page.waitForFunction(() => window.ico3d!.body!.shown!.window === 1);
     await page.unroute('**/body/0001.safetensors*');
   });
 

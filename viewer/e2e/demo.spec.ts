@@ -16,14 +16,14 @@ describe.skipIf(!demoUrl)('the packaged demo (needs src/ico3d/chat/data/demo.ico
 
   test('answers a typed question aloud, and its mouth moves', async () => {
     const { page } = browser;
-    await until(browser, ({ received }) => received.some(({ type }) => type === 'speech'), 30_000);
+    await until(browser, ({ received }) => received.some(({ type }) => type === 'speech'));
     await page.keyboard.press('Escape'); // the greeting is known
     await page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null);
     await page.waitForTimeout(1000);
-    await watchMouth(page);
+    await watchMouth(page, 1200); // a large head: each picture takes a quarter of a second
     await page.fill('#text', 'Who are you?');
     await page.keyboard.press('Enter');
-    const { received, loudness } = await until(browser, finished(1), 60_000);
+    const { received, loudness } = await until(browser, finished(1));
     expect(received.some(({ type }) => type === 'answer')).toBe(true);
     expect(Math.max(...loudness.map(({ level }) => level))).toBeGreaterThan(0.01);
     const { pictures } = await readMouth(page);

@@ -16,7 +16,7 @@ beforeAll(async () => {
   runPython('sound/voice.py', voice, '1', ...Array.from({ length: 8 }, () => ['What is your name?', '4']).flat());
   writeFileSync(join(folder, 'chat.toml'), 'recognition = "browser"\n');
   server = await ChatServer.start(inject('shared').talking, 0, '--settings', join(folder, 'chat.toml'));
-}, 120_000);
+});
 
 afterAll(() => server?.stop());
 
@@ -55,9 +55,7 @@ test('what the browser understood is answered, and the page says who hears it', 
     Object.assign(window, { SpeechRecognition: Recogniser });
   });
   const { page } = browser;
-  await page.waitForFunction(() => document.getElementById('answer')!.textContent === 'I am Stella.', undefined, {
-    timeout: 30_000,
-  });
+  await page.waitForFunction(() => document.getElementById('answer')!.textContent === 'I am Stella.');
   expect(await page.textContent('#question')).toBe('Who are you?');
   expect(await page.isVisible('#shared-voice')).toBe(true);
   await browser.close();
@@ -71,9 +69,7 @@ test('a browser without a recogniser leaves it to the server, and says so', asyn
   expect(await page.locator('#notices p').first().textContent()).toBe(
     'This browser does not recognise speech; pocketsphinx on the server listens instead.',
   );
-  await page.waitForFunction(() => document.getElementById('question')!.textContent !== '', undefined, {
-    timeout: 30_000,
-  });
+  await page.waitForFunction(() => document.getElementById('question')!.textContent !== '');
   expect(await page.isVisible('#shared-voice')).toBe(false);
   await browser.close();
 });

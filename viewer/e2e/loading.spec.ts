@@ -18,9 +18,9 @@ async function visit(browser: Browser): Promise<[named: number, drawn: number]> 
   const begun = performance.now();
   const since = () => (performance.now() - begun) / 1000;
   await page.goto(drawnBy('webgl', demoUrl!), { waitUntil: 'commit' });
-  await page.waitForFunction(() => document.getElementById('name')?.textContent, undefined, { timeout: 60_000 });
+  await page.waitForFunction(() => document.getElementById('name')?.textContent);
   const named = since();
-  await page.waitForFunction(() => (window.ico3d?.stage.frames ?? 0) > 0, undefined, { timeout: 60_000 });
+  await page.waitForFunction(() => (window.ico3d?.stage.frames ?? 0) > 0);
   return [named, since()];
 }
 

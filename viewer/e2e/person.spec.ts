@@ -38,7 +38,7 @@ async function speak(utterance: number): Promise<void> {
 
 /** Waits until the person shows a time of its body. */
 const shows = (time: number) =>
-  page.waitForFunction((seconds) => Math.abs(window.ico3d!.body!.time - seconds) < 1e-6, time, { timeout: 60_000 });
+  page.waitForFunction((seconds) => Math.abs(window.ico3d!.body!.time - seconds) < 1e-6, time);
 
 beforeAll(async () => (server = await servePage(person.folder)));
 afterAll(() => server?.close());
@@ -72,13 +72,13 @@ describe('a whole person', () => {
   beforeAll(() => open('soft'));
   beforeEach(async () => {
     await page.reload();
-    await page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
+    await page.waitForFunction(() => window.ico3d !== undefined);
   });
   afterAll(() => browser?.close());
 
   test('idles in its rest span, and the head follows the body', async () => {
     await watchSteps(page);
-    await page.waitForFunction(() => window.steps!.length > 20 && window.steps!.at(-1)!.at > 4, undefined, { timeout: 60_000 });
+    await page.waitForFunction(() => window.steps!.length > 20 && window.steps!.at(-1)!.at > 4);
     const steps = await readSteps(page);
     const times = steps.map(({ time }) => time);
     expect(steps.every((step) => atRest(person, step))).toBe(true);
@@ -172,12 +172,12 @@ describe('a whole person in a conversation', () => {
   });
 
   test('gestures while it answers, along what the server plans, and returns to rest', async () => {
-    await until(browser, finished(0), 60_000); // the greeting
+    await until(browser, finished(0)); // the greeting
     await watchSteps(page);
     await settle(page, person);
     await page.fill('#text', SHORTER);
     await page.keyboard.press('Enter');
-    const { received } = await until(browser, finished(1), 100_000);
+    const { received } = await until(browser, finished(1));
     const steps = await settle(page, person);
 
     const plan = received.filter(({ type, utterance }) => type === 'timeline' && utterance === 1);

@@ -15,7 +15,7 @@ afterAll(() => browser?.close());
 
 test('the sheet shows who serves, and choosing starts anew', async () => {
   const { page } = browser;
-  await until(browser, finished(0), 60_000); // the greeting
+  await until(browser, finished(0)); // the greeting
   expect(await page.evaluate(() => window.ico3d!.stage.meeting!.stands)).toBe(false); // a head alone has no floor in sight
   await page.setViewportSize({ width: 420, height: 560 });
   const views = await page.locator('.views').boundingBox();

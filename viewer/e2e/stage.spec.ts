@@ -1,7 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
-import { drawSeldom, refreshed } from '../support/browser/drawing.ts';
+import { drawSeldom, playByPictures, refreshed } from '../support/browser/drawing.ts';
 import { drawnBy } from '../support/browser/path.ts';
 import { psnr, takePixels } from '../support/browser/pictures.ts';
 import { makePerson } from '../support/references/person.ts';
@@ -24,7 +24,8 @@ let page: Page;
 
 beforeAll(async () => {
   server = await servePage(makePerson({ gaussians: '300,450' }).folder);
-  browser = await Browser.launch({ width: 160, height: 200, hertz: 60 });
+  browser = await Browser.launch({ width: 160, height: 200 });
+  await playByPictures(browser.page);
   page = await browser.open(drawnBy('webgl', server.url));
 });
 
@@ -210,7 +211,7 @@ test('where pictures take too long, the backdrop goes first, then pixels; the fi
   expect(asked.pixels).toBeCloseTo(0.65, 2);
   await page.getByRole('button', { name: 'Figures' }).click();
   await expect.poll(() => page.locator('#figures').innerText()).toMatch(/quality\s+lower where pictures would come too slowly\s+2 of 6, the best is 6/);
-  expect(await page.locator('#figures').innerText()).toMatch(/evaluate\s+face and body, for each picture\s+[\d.]+ ms\s+draw\s+until a picture is there\s+[\d.]+ ms\s+sort\s+\d+ ms\s+Gaussians\s+[\d,]+/);
+  await expect.poll(() => page.locator('#figures').innerText()).toMatch(/evaluate\s+face and body, for each picture\s+[\d.]+ ms\s+draw\s+until a picture is there\s+[\d.]+ ms\s+sort\s+\d+ ms\s+Gaussians\s+[\d,]+/);
 });
 
 test('thinned out, the backdrop’s largest splats stay; what stands still is made once', async () => {
@@ -236,7 +237,7 @@ test('thinned out, the backdrop’s largest splats stay; what stands still is ma
 test('?bench measures each part and all of them, in two sizes', async () => {
   await page.goto(drawnBy('webgl', `${server.url}?bench=0.01`));
   const table = page.locator('.bench');
-  await expect.poll(() => table.textContent(), { timeout: 60_000 }).toContain('Done.');
+  await expect.poll(() => table.textContent()).toContain('Done.');
   const rows = (await table.textContent())!.split('\n').filter((line) => / ms \|$/.test(line)).map((line) => line.split('|').map((cell) => cell.trim()));
   expect(rows.map(([, part]) => part)).toEqual(['background', 'body', 'head', 'all', 'background', 'body', 'head', 'all']);
   expect(rows.map(([, , pixels]) => pixels)).toEqual([...Array(4).fill('512 × 512'), ...Array(4).fill('160 × 200')]);

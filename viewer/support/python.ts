@@ -1,6 +1,7 @@
-import { execFileSync, spawn } from 'node:child_process';
+import { execFileSync, spawn, type ChildProcessByStdio } from 'node:child_process';
 import { once } from 'node:events';
 import { existsSync } from 'node:fs';
+import type { Readable } from 'node:stream';
 import { fileURLToPath } from 'node:url';
 
 export const REPOSITORY = fileURLToPath(new URL('../../', import.meta.url));
@@ -32,10 +33,17 @@ export async function startForks(address: string): Promise<() => void> {
   return () => forks.stdin.end();
 }
 
+/** What Python is asked that asks for a fork. */
+const forked = (...words: string[]) => ['-I', '-S', FORKS, process.env.ICO3D_FORKS!, ...words];
+
 /** Runs a script of `support/` that imports torch to its end, in a fork of a process that has imported it. */
 export function runFork(script: string, ...args: string[]): void {
-  const words = ['-I', '-S', FORKS, process.env.ICO3D_FORKS!, `${REPOSITORY}viewer/support/${script}`, ...args];
-  execFileSync(PYTHON, words, { stdio: ['ignore', 'ignore', 'inherit'] });
+  execFileSync(PYTHON, forked(`${REPOSITORY}viewer/support/${script}`, ...args), { stdio: ['ignore', 'ignore', 'inherit'] });
+}
+
+/** Starts `ico3d serve` in a fork of a process that has imported what it needs; it ends by SIGINT, or at once by SIGUSR1. */
+export function forkServer(...args: string[]): ChildProcessByStdio<null, Readable, null> {
+  return spawn(PYTHON, forked('serve', ...args), { stdio: ['ignore', 'pipe', 'inherit'] });
 }
 
 /** Runs a script as Python does, without looking for garbage: what is imported, which takes longest, stays. */

@@ -121,10 +121,10 @@ describe('a talk', () => {
     await recordWire(browser.context);
     await withoutWebGL(browser.context);
     const page = await browser.open(drawnBy('webgl', talkingUrl)); // which cannot be
-    await until(browser, finished(0), 30_000);
+    await until(browser, finished(0));
     await page.fill('#text', 'Who are you?');
     await page.keyboard.press('Enter');
-    await until(browser, finished(1), 30_000);
+    await until(browser, finished(1));
     expect(await drawn(page)).toEqual(['soft', 'the processor, as this browser has no WebGL 2']);
     expect(await shades(page, '#stage')).toBeGreaterThan(100); // somebody is seen
     await browser.close();
@@ -134,19 +134,19 @@ describe('a talk', () => {
     const browser = await Browser.launch({ width: 480, height: 360, calm: true });
     await recordWire(browser.context);
     const page = await browser.open(talkingUrl);
-    await until(browser, ({ received }) => received.some(({ type }) => type === 'speech'), 30_000);
+    await until(browser, ({ received }) => received.some(({ type }) => type === 'speech'));
     await page.keyboard.press('Escape'); // the greeting is known
-    await page.fill('#text', SENTENCE); // to which there is a long answer
-    await page.keyboard.press('Enter');
-    const speaks = () => window.ico3d!.conversation!.player.heard()?.utterance === 1;
-    await page.waitForFunction(speaks, undefined, { timeout: 30_000 });
     await page.click('#settings-button');
-    for (const path of ['webgl', 'soft'] as const) {
+    const speaks = (utterance: number) => window.ico3d!.conversation!.player.heard()?.utterance === utterance;
+    for (const [i, path] of (['webgl', 'soft'] as const).entries()) {
+      await page.fill('#text', SENTENCE); // to which there is a long answer
+      await page.press('#text', 'Enter');
+      await page.waitForFunction(speaks, i + 1);
       await page.selectOption('#draw', path);
       await page.waitForFunction((path) => window.ico3d!.stage.painter.path === path && document.querySelectorAll('.picture').length === 1, path);
       const before = await page.evaluate(() => window.ico3d!.stage.frames);
       await page.waitForFunction((frames) => window.ico3d!.stage.frames > frames + 2, before);
-      expect(await page.evaluate(speaks), 'she still speaks').toBe(true);
+      expect(await page.evaluate(speaks, i + 1), 'she still speaks').toBe(true);
       expect(await page.inputValue('#draw')).toBe(path);
     }
     expect(await page.evaluate(() => window.record!.sockets.length)).toBe(1);

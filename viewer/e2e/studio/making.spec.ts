@@ -1,4 +1,4 @@
-import { copyFileSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { afterAll, afterEach, beforeAll, beforeEach, expect, inject, test } from 'vitest';
 import { judge } from '../../support/browser/axe.ts';
@@ -8,19 +8,20 @@ import { hasTracker, MODELS } from '../../support/references/portrait.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { ChatServer } from '../../support/servers/server.ts';
 
-const PATIENCE = { timeout: 90_000 };
 const folder = scratchFolder();
 const person = join(folder, 'Ida');
-const grey = join(scratchFolder(), 'grey.mp4');
+const recorded = scratchFolder();
+const grey = join(recorded, 'grey.mp4');
 const { demo } = inject('shared');
 let server: ChatServer;
 let browser: Browser;
 let page: Browser['page'];
 
 beforeAll(async () => {
-  server = await ChatServer.tracking(folder, MODELS);
+  runPython('studio/recorded.py', recorded, 'Ida', grey);
+  server = await ChatServer.tracking(folder, MODELS, '--voice');
 });
-beforeEach(() => void runPython('studio/recorded.py', folder, 'Ida', grey));
+beforeEach(() => cpSync(join(recorded, 'Ida'), person, { recursive: true }));
 afterEach(async () => {
   await browser.close();
   rmSync(person, { recursive: true, force: true });
@@ -71,7 +72,7 @@ test('build and clothes of a body are chosen in pictures, kept, and said to be m
   expect(await page.isChecked('#bodies [value=sturdy]')).toBe(true);
   expect(await page.isChecked('#bodies [value=wine]')).toBe(true);
   expect(await page.textContent('#title')).toBe('Ida');
-}, 60_000);
+});
 
 test('a reload and the browser’s Back lead where one was', async () => {
   await open();
@@ -87,7 +88,7 @@ test('a reload and the browser’s Back lead where one was', async () => {
   await page.waitForSelector('#start:visible');
   await page.goForward();
   await page.waitForSelector('#room:visible');
-}, 60_000);
+});
 
 test('a making that was stopped says where, and each of its buttons does what it says', async () => {
   progress('stopped');
@@ -112,24 +113,24 @@ test('a making that was stopped says where, and each of its buttons does what it
   expect(existsSync(join(person, 'making'))).toBe(false);
   expect(await page.textContent('#go')).toBe('Make my avatar');
   expect(readdirSync(join(person, 'parts')).filter((name) => name.endsWith('.mp4'))).toEqual(['consent.mp4', 'left.mp4', 'text-1.mp4']);
-}, 120_000);
+});
 
 test('how long each quality takes stands beside it once the server knows', async () => {
   await open();
   const quick = () => page.textContent('#quality [value=quick]');
-  await expect.poll(quick, PATIENCE).toMatch(/^quick, for a first impression \(about \d+ min\)$/);
+  await expect.poll(quick).toMatch(/^quick, for a first impression \(about \d+ min\)$/);
   await page.selectOption('#language', 'de');
   expect(await quick()).toMatch(/^schnell, für einen ersten Eindruck \(etwa \d+ min\)$/);
   expect(await page.inputValue('#quality')).toBe('good');
   await judge(page, 'studio durations');
-}, 120_000);
+});
 
 test('with other recordings nothing goes on, and that is said', async () => {
   progress('stopped', { made_of: { parts: [], on: [] } });
   await open();
   expect(await visible('again', 'anew', 'discard')).toEqual([false, true, true]);
   expect(await page.textContent('#choices')).toMatch(/^The recordings have changed since, so it starts over/);
-}, 60_000);
+});
 
 test('what ends a making, and why there is no voice, is said in the language of the page', async () => {
   const silent = { code: 'voice-short', level: 'better', values: { n: 4, least: 10 }, spans: [], detail: '' };
@@ -164,7 +165,7 @@ test('what ends a making, and why there is no voice, is said in the language of 
   expect(await page.textContent('#technical:visible')).toBe('ZeroDivisionError: division by zero');
   expect(await page.getAttribute('#technical', 'lang')).toBe('en');
   await judge(page, 'studio unforeseen');
-}, 120_000);
+});
 
 test('a making that the system kills is said in the language of the page, and goes on', async () => {
   progress('stopped');
@@ -173,36 +174,36 @@ test('a making that the system kills is said in the language of the page, and go
   await page.click('#again');
   await page.waitForSelector('#halt:visible');
   runPython('studio/killed.py', person);
-  await page.waitForSelector('#again:visible', PATIENCE);
+  await page.waitForSelector('#again:visible');
   expect(await page.textContent('#error')).toMatch(/^La creación fue interrumpida a la fuerza, como ocurre cuando falta memoria/);
   await page.click('#again');
   await page.waitForSelector('#halt:visible');
   expect(await page.textContent('#error')).toBe('');
   await page.click('#halt');
   await page.waitForSelector('#again:visible');
-}, 120_000);
+});
 
 test.skipIf(!hasTracker)('recordings without a face are refused in the language of the page, and stay', async () => {
   await open();
   await page.selectOption('#language', 'de');
   await page.selectOption('#quality', 'quick');
   await page.click('#go');
-  await page.waitForSelector('#anew:visible', PATIENCE);
+  await page.waitForSelector('#anew:visible');
   expect(await page.textContent('#error')).toMatch(/^Kein Gesicht gefunden: Filmen Sie einen wirklichen Menschen/);
   expect(await visible('again', 'anew', 'discard')).toEqual([false, true, true]);
   expect(await page.textContent('#choices')).toMatch(/^Von dort geht es mit diesen Aufnahmen nicht weiter/);
   expect(readdirSync(join(person, 'parts'))).toContain('text-1.mp4');
-}, 200_000);
+});
 
 test.skipIf(!hasTracker)('a video without a face is not kept, and the page says what create says', async () => {
   await open(390, 844);
   await page.selectOption('#language', 'fr');
   await page.setInputFiles('#file', grey);
-  await page.waitForSelector('#problem:visible', PATIENCE);
+  await page.waitForSelector('#problem:visible');
   expect(await page.textContent('#problem')).toMatch(/^Aucun avatar ne peut être créé à partir de cette vidéo.* Aucun visage trouvé : filmez/);
   expect(readdirSync(join(person, 'parts')).filter((name) => name.startsWith('upload'))).toEqual([]);
   expect(await page.isVisible('[data-part=upload]')).toBe(false);
-}, 120_000);
+});
 
 test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not made again for nothing', async () => {
   copyFileSync(demo!, join(person, 'Ida.ico3d'));
@@ -218,15 +219,15 @@ test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not m
   expect(await page.isDisabled('#go')).toBe(false);
   expect(await page.textContent('#go')).toBe('Make it again');
   await page.click('#talk');
-  await page.waitForURL((url) => !url.href.startsWith(server.url), PATIENCE);
+  await page.waitForURL((url) => !url.href.startsWith(server.url));
   await page.goBack();
   await page.waitForSelector('#talk:visible');
   expect(await page.textContent('#title')).toBe('Ida');
   expect(await page.textContent('#talk')).toBe('Talk with the avatar');
   expect(await page.isDisabled('#talk')).toBe(false);
   await page.goForward();
-  await page.waitForURL((url) => !url.href.startsWith(server.url), PATIENCE);
-  await page.waitForSelector('#overlay.gone', { state: 'attached', ...PATIENCE });
+  await page.waitForURL((url) => !url.href.startsWith(server.url));
+  await page.waitForSelector('#overlay.gone', { state: 'attached' });
   const back = page.locator('header .way-back');
   expect(await back.textContent()).toBe('Back to the studio');
   await judge(page, 'talk of the studio');
@@ -237,15 +238,37 @@ test.skipIf(!demo)('the talk’s Back leads to the finished person, who is not m
   await back.click();
   await page.waitForSelector('#talk:visible');
   expect(await page.textContent('#title')).toBe('Ida');
-}, 200_000);
+});
 
 test('a tab on somebody who was deleted elsewhere says so by itself, and a new recording can begin', async () => {
   await open();
   rmSync(person, { recursive: true });
   await page.waitForSelector('#start:visible');
-  await expect.poll(() => page.textContent('#problem'), PATIENCE).toBe(
+  await expect.poll(() => page.textContent('#problem')).toBe(
     'Ida was deleted elsewhere, in another tab or by hand: begin a new recording here.',
   );
   expect(await page.evaluate(() => document.activeElement?.id)).toBe('name');
   expect(page.url()).not.toContain('Ida');
-}, 60_000);
+});
+
+test('a voice is agreed to by a tick of its own, off at first, in the language of the page', async () => {
+  browser = await Browser.launch({ width: 390, height: 844 });
+  page = browser.page;
+  await page.goto(server.url);
+  await page.waitForSelector('#voice-tick:visible');
+  expect(await page.isChecked('#voice')).toBe(false);
+  await judge(page, 'studio voice');
+  await page.selectOption('#language', 'de');
+  await expect.poll(() => page.textContent('#voice-sentence')).toMatch(/^Ich bin auch einverstanden, .* meiner Stimme/);
+  for (const [name, ticks] of [['Una', ['#agreed', '#voice']], ['Ada', ['#agreed']]] as const) {
+    await page.fill('#name', name);
+    for (const tick of ticks) await page.check(tick);
+    await page.click('#begin');
+    await page.waitForSelector('#room:visible');
+    const consent = JSON.parse(readFileSync(join(folder, name, 'consent.json'), 'utf8')) as Record<string, string>;
+    expect('voice_consent' in consent).toBe(name === 'Una');
+    expect((await page.textContent('#text'))!.includes('Stimme')).toBe(name === 'Una');
+    await page.click('#back');
+    await page.waitForSelector('#start:visible');
+  }
+});

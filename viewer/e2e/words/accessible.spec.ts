@@ -30,7 +30,7 @@ test('axe finds nothing serious in any state of the page', async () => {
   await page.waitForFunction(() => document.getElementById('overlay-name')!.textContent === 'Stella');
   await judge(page, 'loading');
   load();
-  await page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
+  await page.waitForFunction(() => window.ico3d !== undefined);
   await page.evaluate(() => window.ico3d!.stage.holdQuality(0));
   await pauseDrawing(page);
   await page.waitForSelector('#choices:visible');

@@ -52,6 +52,20 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
 
   afterAll(() => browser?.close());
 
+  /** Puts what is seen into the folder `$PICTURES`, where it is set. */
+  async function keepPicture(name: string): Promise<void> {
+    if (!process.env.PICTURES) return;
+    await page.evaluate(() => window.ico3d!.stage.still());
+    await page.screenshot({ path: join(process.env.PICTURES, name) });
+  }
+
+  /** Gives the window a size, and waits until the picture has it. */
+  async function sized(width: number, height: number): Promise<void> {
+    await page.setViewportSize({ width, height });
+    await page.waitForFunction((size) => window.ico3d!.stage.painter.pixels.join() === size, [width, height].join());
+    await refreshed(page);
+  }
+
   /** Says how the talk stands in the words, of all languages, that take most room. */
   function writeLongestState(): Promise<void> {
     return page.evaluate((texts) => {
@@ -73,10 +87,8 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
 
   describe.each(SIZES.flatMap((size) => [false, true].map((headsets) => [...size, headsets] as const)))('of %i × %i, headsets: %s', (width, height, headsets) => {
     beforeAll(async () => {
-      await page.setViewportSize({ width, height });
-      await offerHeadsets(headsets);
-      await page.waitForFunction((width) => document.querySelector<HTMLCanvasElement>('#stage')!.width === width, width);
-      await refreshed(page);
+      await offerHeadsets(headsets); // before: what changes later than a second after the size leaves her where she is
+      await sized(width, height);
       await writeLongestState();
     });
 
@@ -85,7 +97,7 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       await refreshed(page);
       await page.evaluate((view) => window.ico3d!.stage.orbit.show(view), view);
       const { head, over } = await overHead(page, AROUND);
-      if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `overlays-${width}x${height}-${view}${headsets ? '-xr' : ''}${size && '-large'}.png`) });
+      await keepPicture(`overlays-${width}x${height}-${view}${headsets ? '-xr' : ''}${size && '-large'}.png`);
       await page.evaluate(() => delete document.documentElement.dataset.captionsSize);
       expect(head).toBeGreaterThan(height > 256 ? 300 : 100);
       expect(over).toEqual([]);
@@ -149,12 +161,13 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       ['what asks the visitor', '#memory-ask'],
       ['that the sound was interrupted', '#silenced'],
     ])('%s', (_, what) => {
-      beforeAll(() =>
-        page.evaluate(([what, text]) => {
+      beforeAll(async () => {
+        await page.evaluate(([what, text]) => {
           if (what === '#notices p') document.getElementById('notices')!.append(Object.assign(document.createElement('p'), { textContent: text }));
           else document.querySelector<HTMLElement>(what)!.hidden = false;
-        }, [what, NOTICE] as const),
-      );
+        }, [what, NOTICE] as const);
+        await refreshed(page);
+      });
 
       afterAll(() =>
         page.evaluate((what) => {
@@ -166,7 +179,7 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
       test.each(VIEWS)('is beside her in the view %s, over nothing else', async (view) => {
         await page.evaluate((view) => window.ico3d!.stage.orbit.show(view), view);
         const { over } = await overHead(page, what);
-        if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `${what.slice(1, 7)}-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`) });
+        await keepPicture(`${what.slice(1, 7)}-${width}x${height}-${view}${headsets ? '-xr' : ''}.png`);
         const { top, covered } = await page.evaluate((what) => {
           const { left, top, right, bottom } = document.querySelector(what)!.getBoundingClientRect();
           const others = document.querySelectorAll<HTMLElement>('#captions, #stop, #composer, #name, #state, header button');
@@ -181,11 +194,9 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
 
   describe.each(['light', 'dark'])('in the %s', (theme) => {
     beforeAll(async () => {
-      await page.setViewportSize({ width: 390, height: 844 });
       if ((await page.evaluate(() => document.body.dataset.theme)) !== theme) await page.click('.theme');
       await page.evaluate(() => window.ico3d!.stage.orbit.show('half'));
-      await page.waitForFunction(() => document.querySelector<HTMLCanvasElement>('#stage')!.width === 390);
-      await refreshed(page);
+      await sized(390, 844);
     });
 
     test('the note under the text box is read on her clothes, too', async () => {
@@ -201,7 +212,6 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
         const canvas = document.querySelector<HTMLCanvasElement>('#stage')!;
         const { left, top, width, height } = note.getBoundingClientRect();
         const { data } = canvas.getContext('2d')!.getImageData(left, top, width, height);
-        window.ico3d!.stage.start();
         let worst = Infinity;
         for (let i = 0; i < data.length; i += 4) {
           const behind = luminance([red!, green!, blue!].map((value, c) => veil * value + (1 - veil) * data[i + c]!));
@@ -209,7 +219,7 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
         }
         return worst;
       });
-      if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `note-${theme}.png`) });
+      await keepPicture(`note-${theme}.png`);
       expect(contrast).toBeGreaterThanOrEqual(4.5);
     });
   });

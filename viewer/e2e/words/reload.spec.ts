@@ -133,12 +133,10 @@ describe('after a reload', () => {
     expect((await rows())[1]).toContain('<img src=x onerror=alert(1)>');
     expect(await page.locator('#record img').count()).toBe(0);
     const [, whole] = (await kept())[0]!;
-    for (const damaged of ['', '{', 'null', '['.repeat(100_000), 'x'.repeat(1_000_000), whole.replace('"you"', '"me"'), whole.replace(/\d{13}/, '1e300'), whole.slice(0, -1)]) {
-      await page.evaluate(() => window.ico3d!.visit.dispose()); // this page writes nothing over it
-      await keep(damaged);
-      await visit();
-      expect([(await rows()).length, await dividers()], damaged.slice(0, 60)).toEqual([1, []]);
-    }
+    await page.evaluate(() => window.ico3d!.visit.dispose()); // this page writes nothing over it
+    await keep(whole.slice(0, -1)); // other damage: `kept-talk.test.ts`
+    await visit();
+    expect([(await rows()).length, await dividers()]).toEqual([1, []]);
     expect(errors).toEqual([]);
   });
 });

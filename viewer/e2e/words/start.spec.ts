@@ -15,21 +15,25 @@ const LOW = [
   [390, 844],
 ] as const;
 
+let browser: Browser;
+let page: Page;
+
+beforeAll(async () => {
+  browser = await Browser.launch({ width: 844, height: 390, calm: true });
+  ({ page } = browser);
+  await keepSound(page);
+  await browser.open(drawnBy('soft', demoUrl ?? talkingUrl));
+  await page.waitForSelector('#choices:visible');
+  await page.waitForSelector('#thumbnail:visible');
+});
+
+afterAll(() => browser?.close());
+
 describe.each(['en', 'de', 'es', 'fr', 'ja', 'zh'])('the start screen (%s)', (language) => {
-  let browser: Browser;
-  let page: Page;
-
   beforeAll(async () => {
-    browser = await Browser.launch({ width: 844, height: 390, calm: true });
-    ({ page } = browser);
-    await keepSound(page);
-    await page.addInitScript((language) => localStorage.setItem('ico3d-language', language), language);
-    await browser.open(drawnBy('soft', demoUrl ?? talkingUrl));
-    await page.waitForSelector('#choices:visible');
-    await page.waitForSelector('#thumbnail:visible');
+    await page.selectOption('#language', language, { force: true });
+    expect(await page.evaluate(() => document.documentElement.lang)).toBe(language);
   });
-
-  afterAll(() => browser?.close());
 
   test.each(LOW)('fits into %i × %i: name, words and both buttons', async (width, height) => {
     await page.setViewportSize({ width, height });

@@ -30,7 +30,7 @@ beforeAll(async () => {
   browser = await openPage(talkingUrl, { width: 1280, height: 720, calm: true });
   await pauseDrawing(browser.page);
   await browser.context.grantPermissions(['clipboard-read', 'clipboard-write']);
-  await until(browser, finished(0), 30_000); // the greeting
+  await until(browser, finished(0)); // the greeting
 });
 afterAll(() => browser?.close());
 
@@ -58,7 +58,7 @@ describe('an answer', () => {
       }, 20);
     });
     await ask(SHORTER);
-    const { received } = await until(browser, finished(1), 60_000);
+    const { received } = await until(browser, finished(1));
     const sights = (await page.evaluate(() => (window as unknown as { sights: Sight[] }).sights)) as Sight[];
     const spoken = (received as unknown as Spoken[]).filter(({ type, utterance }) => type === 'spoken' && utterance === 1);
     expect(spoken.length).toBeGreaterThanOrEqual(2); // sentences
@@ -194,7 +194,7 @@ test('on a phone she comes back to where there is room again, once captions have
   await ask('');
   await page.waitForTimeout(1000);
   expect(await covered()).toBeGreaterThan(few + 150); // the picture does not jump
-  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: { all: number } }).covered.all < few + 20, few, { timeout: 20_000 });
+  await page.waitForFunction((few) => (window.ico3d!.stage as unknown as { covered: { all: number } }).covered.all < few + 20, few);
   await page.setViewportSize({ width: 1280, height: 720 });
 });
 
@@ -226,7 +226,7 @@ describe('the drawer', () => {
     const { page } = browser;
     const before = await record();
     await page.evaluate(() => window.record!.sockets.at(-1)!.close());
-    await until(browser, ({ received }) => received.filter(({ type }) => type === 'welcome').length === 2, 30_000);
+    await until(browser, ({ received }) => received.filter(({ type }) => type === 'welcome').length === 2);
     expect(await record()).toEqual(before);
     await page.evaluate(() => window.ico3d!.conversation!.choose({ kind: 'language', key: 'persona-notes', name: '', hindrance: '' }));
     await page.waitForFunction((count) => document.querySelectorAll('#record > div').length === count + 1, before.length); // the new greeting

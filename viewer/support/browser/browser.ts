@@ -1,6 +1,7 @@
 import { copyFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { chromium, type Browser as Chromium, type BrowserContext, type Page } from 'playwright-core';
+import { PATIENCE } from '../patience.ts';
 import { scratchFolder } from '../scratch.ts';
 
 const WITHOUT = [
@@ -101,6 +102,7 @@ export class Browser {
   private constructor(context: BrowserContext, page: Page) {
     this.context = context;
     this.page = page;
+    context.setDefaultTimeout(PATIENCE);
     page.on('console', (message) => {
       if (message.type() === 'error' && !message.text().includes('WebSocket')) console.error('page:', message.text());
     });
@@ -128,8 +130,8 @@ export class Browser {
    * @param adapts whether the quality of pictures follows their rate, as for visitors; else it is the best
    */
   async open(url: string, adapts = false): Promise<Page> {
-    await this.page.goto(url, { timeout: 60_000 });
-    await this.page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
+    await this.page.goto(url);
+    await this.page.waitForFunction(() => window.ico3d !== undefined);
     if (!adapts) await this.page.evaluate(() => window.ico3d!.stage.holdQuality(0)); // software rendering is slow
     return this.page;
   }

@@ -25,8 +25,10 @@ declare global {
 /**
  * Watches the mouth of a face that is at rest now: its expression at each tick, and a picture of the
  * head alone now and then; no others are drawn.
+ *
+ * @param every ms from one picture to the next
  */
-export async function watchMouth(page: Page): Promise<void> {
+export async function watchMouth(page: Page, every = PICTURE_EVERY): Promise<void> {
   await drawSeldom(page);
   await hideBody(page);
   await page.evaluate(async (every) => {
@@ -89,7 +91,7 @@ export async function watchMouth(page: Page): Promise<void> {
       record.sights.push({ at, speech: Math.hypot(...rest.subarray(0, FEATURES).map((value, i) => value - expression[i]!)) });
       if (at - (record.pictures.at(-1)?.at ?? 0) > every) record.pictures.push({ at, change: change() });
     }, 33);
-  }, PICTURE_EVERY);
+  }, every);
 }
 
 /** Everything watched so far. */

@@ -4,6 +4,7 @@ import type { Page } from 'playwright-core';
 import { Browser, type BrowserOptions } from './browser.ts';
 import { drawSeldom } from './drawing.ts';
 import { drawnBy, type Path } from './path.ts';
+import { PATIENCE } from '../patience.ts';
 import { REPOSITORY, runPython } from '../python.ts';
 import { readRecord, recordLoudness, recordWire, type Record } from './recorder.ts';
 
@@ -16,6 +17,7 @@ export const SILENCE = 1e-4; // level of the avatar under which nothing is heard
 
 /**
  * Opens the page of a server in a small window that draws nothing by itself, and records its conversation.
+ * The server has answered then: what is typed is sent, unless there is no place yet.
  *
  * @param path what draws where a test asks for a picture; without Spark a page starts with half of the work
  */
@@ -25,11 +27,12 @@ export async function openPage(url: string, options: BrowserOptions = {}, path: 
   await browser.open(drawnBy(path, url));
   await drawSeldom(browser.page);
   await recordLoudness(browser.page);
+  await until(browser, ({ received }) => received.length > 0);
   return browser;
 }
 
 /** Waits until the recorded conversation fulfils a condition; then gives the record. */
-export async function until(browser: Browser, condition: (record: Record) => boolean, timeout: number): Promise<Record> {
+export async function until(browser: Browser, condition: (record: Record) => boolean, timeout = PATIENCE): Promise<Record> {
   for (const end = Date.now() + timeout; Date.now() < end; ) {
     const record = await readRecord(browser.page);
     if (condition(record)) return record;

@@ -1,6 +1,6 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { runPython } from '../python.ts';
+import { runFork } from '../python.ts';
 import { scratchFolder } from '../scratch.ts';
 
 /** What Python makes of a bundle (`head_reference.py`). */
@@ -17,7 +17,7 @@ export interface Reference {
 export function makeReference(options: { bundle?: string; gaussians?: number; pictures?: string; shoulders?: true }): Reference {
   const out = scratchFolder();
   const args = Object.entries(options).flatMap(([name, value]) => (value === true ? [`--${name}`] : [`--${name}`, String(value)]));
-  runPython('references/head_reference.py', out, ...args);
+  runFork('references/head_reference.py', out, ...args);
   const json = JSON.parse(readFileSync(join(out, 'reference.json'), 'utf8')) as Reference;
   return {
     file: options.bundle ?? join(out, 'random.ico3d'),

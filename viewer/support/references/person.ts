@@ -2,6 +2,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { drawSeldom } from '../browser/drawing.ts';
+import { PATIENCE } from '../patience.ts';
 import { runFork } from '../python.ts';
 import { scratchFolder } from '../scratch.ts';
 
@@ -112,7 +113,7 @@ export function atRest({ rest: [start, end] }: PersonReference, { time }: Step):
 
 /** Waits until the person has been at rest, silent, for two seconds; all that the pictures showed. */
 export async function settle(page: Page, person: PersonReference): Promise<Step[]> {
-  for (const limit = Date.now() + 60_000; Date.now() < limit; ) {
+  for (const limit = Date.now() + PATIENCE; Date.now() < limit; ) {
     await page.waitForTimeout(500);
     const steps = await readSteps(page);
     const last = steps.filter(({ at }) => at > steps.at(-1)!.at - 2);

@@ -29,7 +29,7 @@ def makers_of(folder: str) -> list[int]:
 def main() -> int:
     """Does what the file's docstring says; the exit status."""
     (folder,) = sys.argv[1:]
-    end = time.monotonic() + 30
+    end = time.monotonic() + 100
     while not (processes := makers_of(folder)):
         if time.monotonic() > end:
             return 1

@@ -68,7 +68,9 @@ test.each([
   `{"avatar":"Ada","lines":[${Array.from({ length: 201 }, () => '["you",1,"x",false]').join()}]}`,
   `{"avatar":"Ada","lines":[["you",1,"${'x'.repeat(60_000)}",false]]}`,
   '['.repeat(59_000),
+  'x'.repeat(1_000_000),
   '\u0000\ud800',
+  '{',
   '',
 ])('what is no talk, or not hers, is none: %s', (text) => {
   kept.set(KEY, text);
