@@ -116,6 +116,9 @@ test('nothing is drawn and no time passes while the page is hidden', async () =>
 });
 
 test('keys and buttons fly to face, half and whole figure; a text takes the keys', async () => {
+  const small = page.viewportSize()!; // there, a face is as near as words above and controls below let it be
+  await page.setViewportSize({ width: 480, height: 480 });
+  await refreshed(page);
   await page.focus('#stage');
   expect(await view()).toEqual({ shown: 'half', pressed: ['Head and chest'] });
   await page.evaluate(() => {
@@ -140,6 +143,7 @@ test('keys and buttons fly to face, half and whole figure; a text takes the keys
   await page.focus('#stage');
   await page.keyboard.press('ArrowLeft');
   expect(await view()).toEqual({ shown: null, pressed: [] });
+  await page.setViewportSize(small);
 });
 
 test('somebody stands on a floor with a shadow in a room, bright or dark, which all ways of drawing show alike', async () => {

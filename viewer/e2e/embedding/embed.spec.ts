@@ -351,11 +351,11 @@ describe('an inline one in the language that its site gives it', () => {
   afterAll(() => browser?.close());
 
   test('begins light or dark, as the visitor’s system is', async () => {
-    const veil = () => avatar().locator('#overlay').evaluate((overlay) => getComputedStyle(overlay).backgroundColor.match(/[\d.]+/g)!.map(Number)[0]!);
-    expect([await theme(), (await veil()) > 200]).toEqual(['light', true]);
+    const words = () => avatar().locator('#overlay').evaluate((overlay) => getComputedStyle(overlay).color.match(/[\d.]+/g)!.map(Number)[0]!);
+    expect([await theme(), (await words()) < 60]).toEqual(['light', true]);
     await page.emulateMedia({ colorScheme: 'dark' });
     await expect.poll(theme).toBe('dark');
-    expect(await veil()).toBeLessThan(60);
+    expect(await words()).toBeGreaterThan(200);
     await page.emulateMedia({ colorScheme: 'light' });
     await expect.poll(theme).toBe('light');
   });
