@@ -57,6 +57,7 @@ async function says({ page }: Browser, sentence: RegExp): Promise<void> {
     { timeout: 60_000 },
   );
   expect(await page.locator('#overlay').evaluate((overlay) => (overlay as HTMLElement).inert)).toBe(false);
+  expect(await page.isHidden('.portrait')).toBe(true); // nothing is behind the words
 }
 
 const goes = ({ page }: Browser) => page.waitForFunction(() => document.getElementById('overlay')!.inert, undefined, { timeout: 60_000 });
