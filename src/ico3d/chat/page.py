@@ -75,10 +75,11 @@ class Page:
         self._outbox = outbox
 
     def detach(self, outbox: Outbox) -> bool:
-        """Removes a connection that has closed; returns whether the page is now without one."""
-        if self._outbox is outbox:
-            self._outbox = None
-        return self._outbox is None
+        """Removes a connection that has closed; returns whether it was the page's."""
+        if self._outbox is not outbox:
+            return False
+        self._outbox = None
+        return True
 
     def end(self, last: ServerMessage) -> None:
         """Sends a last message and closes the connection, if there is one."""

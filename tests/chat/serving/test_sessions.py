@@ -102,6 +102,22 @@ async def test_a_second_connection_takes_the_session_over(bundle):
         await asyncio.gather(page.close(), again.close())
 
 
+async def test_a_line_that_closes_late_ends_no_session_that_goes_on(bundle):
+    async with serving(bundle, TYPED, resume_seconds=1.0) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        (session,) = sessions.present()
+        first = session.page._outbox
+        second, _ = await open_page(url, welcome.session, -1, microphone=False)
+        await dropped(second)
+        while session.page.is_attached:
+            await asyncio.sleep(0.01)
+        sessions.leave(session, first)  # of which nothing was heard until now
+        again, told = await open_page(url, welcome.session, -1, microphone=False)
+        await asyncio.sleep(1.5)
+        assert told.resumed and sessions.present() == [session]
+        await asyncio.gather(page.close(), again.close())
+
+
 async def test_a_line_that_carries_nothing_else_beats(bundle):
     async with serving(bundle, TYPED) as (url, _):
         page, _ = await open_page(url, microphone=False)
