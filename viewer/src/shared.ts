@@ -15,6 +15,9 @@ export const MAX_GAUSSIANS = 1000000;
 /** What SPZ files may unpack to, and their highest degree; common/spz/container.py. */
 export const SPZ = {"ratio": 8, "free": 262144, "degree": 3} as const;
 
+/** What else a bundle may have: a head's counts, a body's frames, bytes of a file. */
+export const MOST = {"rank": 64, "hidden": 1024, "expression_size": 512, "num_poses": 100000, "window_frames": 1000, "posed_frames": 30000, "file_bytes": 268435456} as const;
+
 /** Residual shapes of a body on a skeleton. */
 export const MAX_SHAPES = 8;
 

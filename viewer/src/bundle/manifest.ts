@@ -10,6 +10,7 @@ import {
   MAX_JOINTS,
   MAX_SHAPES,
   MAX_SKY,
+  MOST,
   OLDEST_BUNDLE,
 } from '../shared.ts';
 
@@ -121,6 +122,7 @@ export function checkManifest(value: unknown): Manifest {
     throw new PageError(`This avatar has format version ${manifest.version}; the page reads up to ${BUNDLE_VERSION}.`);
   }
   const { camera, background } = manifest;
+  checkFiles(manifest.files);
   const body = manifest.body ?? null; // older manifests do not know of it
   const head = manifest.head && { ...manifest.head, num_rest: manifest.head.num_rest ?? 0 };
   const skinned = manifest.skinned ? withDefaults(manifest.skinned) : null;
@@ -136,6 +138,13 @@ export function checkManifest(value: unknown): Manifest {
   if (!isNumbers(background, 3)) bad('background');
   checkProvenance(manifest.provenance);
   return { ...manifest, head, body, skinned };
+}
+
+/** Room is made for files before they come, which may be packed on the way. */
+function checkFiles(files: Manifest['files']): void {
+  for (const [name, file] of Object.entries(files ?? bad('files'))) {
+    if (file?.size !== 0 && !isCount(file?.size, MOST.file_bytes)) bad(`files.${name}`);
+  }
 }
 
 /** Texts go onto the page. */
@@ -167,9 +176,11 @@ function isRest(rest: number, all: number): boolean {
 }
 
 function checkHead(head: HeadInfo): void {
-  for (const key of ['num_gaussians', 'rank', 'hidden', 'expression_size', 'num_poses', 'fps'] as const) {
-    if (!isPositive(head[key])) bad(`head.${key}`);
+  for (const key of ['rank', 'hidden', 'expression_size', 'num_poses'] as const) {
+    if (!isCount(head[key], MOST[key])) bad(`head.${key}`);
   }
+  if (!isCount(head.num_gaussians, MAX_GAUSSIANS)) bad('head.num_gaussians'); // room is made for all before the last ones come
+  if (!isPositive(head.fps)) bad('head.fps');
   if (!isRest(head.num_rest, head.num_gaussians)) bad('head.num_rest');
   if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
 }
@@ -182,7 +193,7 @@ function checkBody(body: BodyInfo): void {
     const { first, last, ranks } = window;
     if (window.file !== windowFile(i)) bad(`body.windows[${i}].file`); // else any address could be asked for
     const begins = i ? body.windows[i - 1]!.last : 0;
-    if (first !== begins || !Number.isInteger(last) || last <= first) bad(`body.windows[${i}]`);
+    if (first !== begins || !isCount(last - first, MOST.window_frames)) bad(`body.windows[${i}]`);
     if (!isCount(window.num_gaussians, MAX_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
     if (!isCount(window.num_clusters, MAX_CLUSTERS)) bad(`body.windows[${i}].num_clusters`);
     const counted = isNumbers(ranks, 3) && ranks.every((rank) => isCount(rank, MOST_LAYERS));
@@ -208,7 +219,7 @@ function checkSkinned(info: SkinnedInfo): void {
   if (!Array.isArray(names) || !isCount(names.length, MAX_JOINTS)) bad('skinned.names');
   const tree = isNumbers(parents, names.length) && parents.every((parent, i) => Number.isInteger(parent) && parent < i && parent >= Math.min(i - 1, 0));
   if (!tree) bad('skinned.parents');
-  const most = { num_frames: Infinity, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: info.num_frames };
+  const most = { num_frames: MOST.posed_frames, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: info.num_frames };
   for (const [key, top] of Object.entries(most)) if (!isCount(info[key as keyof typeof most], top)) bad(`skinned.${key}`);
   if (info.num_frames < 2) bad('skinned.num_frames');
   if (!isRest(info.num_rest, info.num_gaussians)) bad('skinned.num_rest');

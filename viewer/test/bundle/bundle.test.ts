@@ -80,10 +80,22 @@ describe('a damaged bundle is refused in one sentence', () => {
     ['other version', () => checkManifest({ ...manifest, version: 7 }), /format version 7/],
     ['not a manifest', () => checkManifest(null), /not that of an avatar bundle/],
     ['short idle face', () => checkManifest({ ...manifest, head: { ...manifest.head, idle_expression: [0] } }), /idle_expression/],
+    ['more Gaussians than there is room for', () => checkManifest({ ...manifest, head: { ...manifest.head, num_gaussians: 1_000_001 } }), /head\.num_gaussians/],
+    ['a rank without end', () => checkManifest({ ...manifest, head: { ...manifest.head, rank: 65 } }), /head\.rank/],
+    ['poses without end', () => checkManifest({ ...manifest, head: { ...manifest.head, num_poses: 100_001 } }), /head\.num_poses/],
+    ['a window without end', () => checkManifest({ ...manifest, head: null, body: lasting(1001) }), /body\.windows\[0\] /],
+    ['a file without end', () => checkManifest({ ...manifest, files: { x: { sha256: '', size: 2 ** 28 + 1 } } }), /files\.x/],
+    ['no files', () => checkManifest({ ...manifest, files: undefined }), /files/],
     ['no camera', () => checkManifest({ ...manifest, camera: null }), /camera/],
   ];
   test.each(cases)('%s', (_, act, sentence) => expect(act).toThrow(sentence));
 });
+
+/** A body with one window. */
+function lasting(frames: number) {
+  const window = { first: 0, last: frames, num_gaussians: 1, num_clusters: 1, ranks: [1, 1, 1], file: 'body/0000.safetensors' };
+  return { fps: 25, samples_per_frame: 1, low: [0, 0, 0], high: [1, 1, 1], windows: [window] };
+}
 
 function entry(dtype: string, shape: number[], size: number): string {
   return JSON.stringify({ x: { dtype, shape, data_offsets: [0, size] } });
