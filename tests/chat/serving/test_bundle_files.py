@@ -4,13 +4,19 @@ import asyncio
 import gc
 import gzip
 import json
+import threading
+from dataclasses import replace
 
 import httpx
 import pytest
 from fastapi import FastAPI, Request
 
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.manifest import FileEntry
 from ico3d.bundle.persona import Persona
-from ico3d.chat.serving.bundle_files import PIECE, BundleFiles
+from ico3d.chat.serving import bundle_files
+from ico3d.chat.serving.bundle_files import AT_ONCE, PIECE, BundleFiles
+from support.chat.serving import TYPED, serving, visiting
 
 FOR_EVER = "public, max-age=31536000, immutable"
 HEAD, PICTURE = "head.safetensors", "thumbnail.png"
@@ -103,3 +109,58 @@ async def test_many_slow_readers_share_one_copy(bundle, monkeypatch):
     await asyncio.sleep(0.1)  # the loop closes what was left amid its pieces
     files.answer(HEAD, Request(scope))
     assert reads == [HEAD, HEAD]  # nothing is kept that nobody is sent
+
+
+class ManyFiles:
+    """A bundle with as many files of zeros as long recordings have."""
+
+    names = tuple(f"body/{i:04d}.safetensors" for i in range(40))
+    manifest = replace(Bundle.open("demo").manifest, files={n: FileEntry(n, 1000) for n in names})
+
+    def read(self, name):
+        return bytes(1000)
+
+
+def test_however_many_files_there_are_each_is_compressed_once(monkeypatch):
+    compress, sizes = gzip.compress, []
+    monkeypatch.setattr(gzip, "compress", lambda d, **o: sizes.append(len(d)) or compress(d, **o))
+    files = BundleFiles(ManyFiles(), None)
+    scope = {"headers": [(b"accept-encoding", b"gzip")], "query_string": b"", "path": "/"}
+    for name in 3 * ManyFiles.names:
+        answer = files.answer(name, Request({"type": "http", **scope}))
+        assert answer.headers["content-encoding"] == "gzip"
+    assert sizes == 40 * [1000]
+
+
+def test_what_finds_no_room_is_sent_as_it_is(monkeypatch):
+    monkeypatch.setattr(bundle_files, "KEPT_BYTES", 1010)
+    files = BundleFiles(ManyFiles(), None)
+    scope = {"headers": [(b"accept-encoding", b"gzip")], "query_string": b"", "path": "/"}
+    asked = [files.answer(n, Request({"type": "http", **scope})) for n in ManyFiles.names[:2]]
+    assert ["content-encoding" in answer.headers for answer in asked] == [True, False]
+
+
+async def test_who_asks_for_files_leaves_threads_to_voices(bundle, monkeypatch):
+    answer, reading, most = BundleFiles.answer, [], []
+
+    def slow(files, name, request):
+        reading.append(name)
+        most.append(len(reading))
+        threading.Event().wait(0.02)
+        reading.pop()
+        return answer(files, name, request)
+
+    monkeypatch.setattr(BundleFiles, "answer", slow)
+    async with serving(bundle, TYPED) as (url, _), visiting(url) as page:
+        answers = await asyncio.gather(*[page.get(f"bundle/{HEAD}") for _ in range(20)])
+    assert [a.status_code for a in answers] == 20 * [200]
+    assert max(most) == AT_ONCE
+
+
+async def test_nothing_is_read_for_who_has_left(bundle, monkeypatch):
+    async def left():
+        return {"type": "http.disconnect"}
+
+    monkeypatch.setattr(bundle, "read", lambda name: pytest.fail(name))
+    scope = {"type": "http", "headers": [], "query_string": b"", "path": "/"}
+    assert (await BundleFiles(bundle, None).serve(HEAD, Request(scope, left))).status_code == 499

@@ -4,10 +4,10 @@ An address with `?sha256=HASH` names one content for ever, so browsers keep that
 address without a hash they ask again, and get 304 while the file is the same.
 """
 
+import asyncio
 import gzip
 from collections.abc import AsyncIterator
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from weakref import WeakValueDictionary
 
@@ -29,12 +29,17 @@ TYPES = {
 GZIP = "gzip"
 WORTHWHILE = 0.97
 """Largest share of its size that a file may keep if it is to be sent compressed."""
-KEPT_FILES = 32
-"""Number of compressed files that are kept in memory, those that were asked for last."""
+KEPT_BYTES = 1 << 27
+"""Bytes of compressed files that are kept. What finds no room is sent as it is: were it compressed
+for each who asks, a few who ask without a pause would take the whole machine."""
 MAX_COMPRESSED = 1 << 24
 """Largest size in bytes of a file that is compressed."""
 PIECE = 1 << 18
 """Bytes that are handed to a connection at once, of which a slow reader leaves many waiting."""
+AT_ONCE = 2
+"""Files that are read at a time: voices speak in the same threads."""
+GONE = 499
+"""Status of an answer that nobody waits for."""
 
 
 class Content:
@@ -51,17 +56,26 @@ class Content:
 
 
 class BundleFiles:
-    """Answers requests for a bundle's files; it reads and compresses, so it runs in a thread."""
+    """Answers requests for a bundle's files."""
 
     def __init__(self, bundle: Bundle, persona: Persona | None):
         """Serves the files of `bundle`, with `persona` in the manifest in place of its own."""
         self._bundle = bundle
         self._persona = persona
         self._being_sent: WeakValueDictionary[str, Content] = WeakValueDictionary()
-        self._compressed = lru_cache(KEPT_FILES)(self._compress)
+        self._kept: dict[str, Content | None] = {}
+        self._room = KEPT_BYTES
+        self._turns = asyncio.Semaphore(AT_ONCE)
+
+    async def serve(self, name: str, request: Request) -> Response:
+        """Answers in turn; nothing is read for those who have left meanwhile."""
+        async with self._turns:
+            if await request.is_disconnected():
+                return Response(status_code=GONE)
+            return await asyncio.to_thread(self.answer, name, request)
 
     def answer(self, name: str, request: Request) -> Response:
-        """The file `name`, or 304 if the browser has it."""
+        """The file `name`, or 304 if the browser has it; it reads and compresses."""
         if name not in self._bundle.names or name == VOICE:  # no page needs it: it stays here
             return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
         entry = self._bundle.manifest.files.get(name)
@@ -90,13 +104,20 @@ class BundleFiles:
         shown = Persona(persona.name, persona.greeting, languages=persona.languages)
         return replace(self._bundle.manifest, persona=shown).to_json()
 
-    def _compress(self, name: str) -> Content | None:
-        """A file's content by gzip; None where that saves little."""
-        data = self._content(name)
-        if len(data) > MAX_COMPRESSED:
+    def _compressed(self, name: str) -> Content | None:
+        """A file's content by gzip; None where that saves little, or finds no room."""
+        if name not in self._kept:
+            self._kept[name] = self._compress(self._content(name))
+        return self._kept[name]
+
+    def _compress(self, data: bytes) -> Content | None:
+        if len(data) > min(MAX_COMPRESSED, self._room):
             return None
         small = gzip.compress(data, mtime=0)
-        return Content(small) if len(small) <= WORTHWHILE * len(data) else None
+        if len(small) > WORTHWHILE * len(data):
+            return None
+        self._room -= len(small)
+        return Content(small)
 
 
 def _takes_gzip(request: Request) -> bool:

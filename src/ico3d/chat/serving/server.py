@@ -113,7 +113,7 @@ def make_app(
 
     @app.get("/bundle/{name:path}")
     async def bundle_file(name: str, request: Request) -> Response:
-        return await asyncio.to_thread(files.answer, name, request)
+        return await files.serve(name, request)
 
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
