@@ -123,7 +123,9 @@ class ManyFiles:
 
 def test_however_many_files_there_are_each_is_compressed_once(monkeypatch):
     compress, sizes = gzip.compress, []
-    monkeypatch.setattr(gzip, "compress", lambda d, **o: sizes.append(len(d)) or compress(d, **o))
+    monkeypatch.setattr(
+        gzip, "compress", lambda d, *o, **k: sizes.append(len(d)) or compress(d, *o, **k)
+    )
     files = BundleFiles(ManyFiles(), None)
     scope = {"headers": [(b"accept-encoding", b"gzip")], "query_string": b"", "path": "/"}
     for name in 3 * ManyFiles.names:
