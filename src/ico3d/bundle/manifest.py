@@ -223,16 +223,17 @@ class Manifest:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
         value = parse_json(data, MANIFEST, BundleError)
         _check_version(value)
-        if value["version"] < SINCE_REST:
+        written: int = value["version"]
+        if written < SINCE_REST:
             value |= {
                 part: {"num_rest": 0, **value[part]}
                 for part in ("head", "skinned")
                 if isinstance(value.get(part), dict)
             }
-        missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
-        if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
+        missing = {name for name, since in SINCE.items() if written < since} - set(value)
+        if written < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
-        if value["version"] < SINCE_SKY and isinstance(value.get("skinned"), dict):
+        if written < SINCE_SKY and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_sky": 0, **value["skinned"]}}
         value = {**value, "version": VERSION, **dict.fromkeys(missing)}
         if "persona" in value:

@@ -159,11 +159,12 @@ class BakedSkinned:
             tensors = decode_tensors(data, _spec(info), SKINNED)
         lamp = {name: tensors.pop(name) for name in lamp_spec(info)}
         sky = {name: tensors.pop(name) for name in sky_spec(info)}
-        light = {
-            "lamp": BakedLamp(**lamp) if lamp else None,
-            "sky": BakedSky(**sky) if sky else None,
-        }
-        baked = BakedSkinned(**tensors, info=info, **light)
+        baked = BakedSkinned(
+            **tensors,
+            info=info,
+            lamp=BakedLamp(**lamp) if lamp else None,
+            sky=BakedSky(**sky) if sky else None,
+        )
         _check_values(baked)
         return baked
 
