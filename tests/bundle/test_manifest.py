@@ -33,7 +33,7 @@ def test_round_trip():
     ("path", "value", "message"),
     [
         ("format", "glb", "no ico3d bundle"),
-        ("version", 7, "versions 1 to 6"),
+        ("version", 6, "versions 1 to 5"),
         ("head.num_gaussians", 0, "num_gaussians"),
         ("head.num_gaussians", 10**9, "num_gaussians"),
         ("head.num_gaussians", 4.5, "a whole number"),

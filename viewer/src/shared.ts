@@ -4,7 +4,7 @@
 export const BUNDLE_FORMAT = "ico3d-bundle";
 
 /** The newest version of a manifest. */
-export const BUNDLE_VERSION = 6;
+export const BUNDLE_VERSION = 5;
 
 /** The oldest version that is read. */
 export const OLDEST_BUNDLE = 1;
@@ -30,11 +30,8 @@ export const MAX_CLUSTERS = 256;
 /** Spheres that cast its shadow. */
 export const MAX_CASTERS = 20000;
 
-/** Directions from which light from all around is looked for. */
-export const MAX_SKY = 64;
-
 /** The map in which a lamp sees a body, in metres; rig/shadow_map.py. */
-export const SHADOW = {"radius": 0.02, "texel": 0.0125, "side": 256, "off": 0.01, "bias": 0.03, "edge": 0.002, "wrap": 0.2, "skyLeast": 0.05} as const;
+export const SHADOW = {"radius": 0.02, "texel": 0.0125, "side": 256, "off": 0.01, "bias": 0.03, "edge": 0.002, "wrap": 0.2} as const;
 
 /** Sentences of earlier visits; chat/wire/protocol_visits.py. */
 export const MAX_NOTES = 16;

@@ -8,7 +8,6 @@ from ico3d.body.motion.window_model import HARMONICS, Motion, WindowModel
 from ico3d.body.skinning.kernels import INFLUENCES
 from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
-from ico3d.body.skinning.sky import CARRIERS
 from ico3d.rig.rig import Rig
 from ico3d.splat import harmonics
 from ico3d.training.checkpoint import Size, check_tensor
@@ -37,7 +36,7 @@ def check_window(model: WindowModel) -> None:
     if HARMONICS in model.gaussians:
         rows[HARMONICS] = (harmonics_of(model), 3)
     sizes = {name: (count, *row) for name, row in rows.items()} | _shared(motion)
-    limits = _limits(motion, model)
+    limits = _limits(motion)
     for name, tensor in {**model.gaussians, **model.shared}.items():
         check_tensor(name, tensor, sizes[name], limits.get(name))
     if model.camera_colors is not None:
@@ -69,7 +68,6 @@ def _rows(motion: Motion) -> dict[str, Size]:
     if isinstance(motion, Skinned):
         shapes = (3, motion.shapes)
         rows = {"skin_joints": (INFLUENCES,), "skin_logits": (INFLUENCES,), "normals": (3,)}
-        rows |= {"sky_casters": (CARRIERS,), "sky_weights": (CARRIERS,)}
         return rows | {"shape_means": shapes, "shape_colors": shapes}
     return {}
 
@@ -102,17 +100,15 @@ def _shared(motion: Motion) -> dict[str, Size]:
         "caster_points": (None, 3),
         "caster_joints": (None, INFLUENCES),
         "caster_weights": (None, INFLUENCES),
-        "caster_normals": (None, 3),
     }
     return skeleton | {NETWORK + name: size for name, size in network.items()}
 
 
-def _limits(motion: Motion, model: WindowModel) -> dict[str, int]:
-    """Names of tensors of numbers of joints or spheres, and below what these stay."""
+def _limits(motion: Motion) -> dict[str, int]:
+    """Names of tensors of numbers of joints, and below what these stay."""
     if not isinstance(motion, Skinned):
         return {}
-    limits = dict.fromkeys(("skin_joints", "caster_joints"), len(motion.names))
-    return limits | ({"sky_casters": len(model.shared["caster_points"])} if motion.sky else {})
+    return dict.fromkeys(("skin_joints", "caster_joints"), len(motion.names))
 
 
 def _check_skeleton(motion: Skinned, model: WindowModel) -> None:
@@ -120,7 +116,7 @@ def _check_skeleton(motion: Skinned, model: WindowModel) -> None:
     Rig(motion.names, motion.parents, model.shared["rig_joints"].detach().cpu().double().numpy())
     casters = [tensor for name, tensor in model.shared.items() if name.startswith("caster_")]
     if len({len(tensor) for tensor in casters}) > 1:
-        raise ValueError("casters differ in number")
+        raise ValueError("caster_points, caster_joints and caster_weights differ in number")
 
 
 def _check_box(motion: Deformation) -> None:

@@ -25,7 +25,5 @@ MAX_KNOWN_POSES = MOST_KNOWN
 """Stored poses with which a page compares every pose."""
 MAX_CASTERS = 20_000
 """Spheres that a page draws into a shadow map at every pose."""
-MAX_SKY = 64
-"""Directions in which it draws them for light from all around."""
 MAX_CAMERA_LENGTH = 1e4
 """Metres; anything farther overflows when a camera is made of it."""

@@ -20,15 +20,13 @@ from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 6
+VERSION = 5
 SINCE = {"body": 2, "skinned": 3}
 """Version in which a field appeared; in older manifests that field is read as null."""
 SINCE_CASTERS = 4
 """Version in which a body on a skeleton got `num_casters`; older ones cast no shadow."""
 SINCE_REST = 5
 """Version in which heads and bodies on a skeleton got `num_rest`; older ones are in one file."""
-SINCE_SKY = 6
-"""Version in which a body on a skeleton got `num_sky`; older ones hide no light from themselves."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
@@ -223,18 +221,15 @@ class Manifest:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
         value = parse_json(data, MANIFEST, BundleError)
         _check_version(value)
-        written: int = value["version"]
-        if written < SINCE_REST:
+        if value["version"] < SINCE_REST:
             value |= {
                 part: {"num_rest": 0, **value[part]}
                 for part in ("head", "skinned")
                 if isinstance(value.get(part), dict)
             }
-        missing = {name for name, since in SINCE.items() if written < since} - set(value)
-        if written < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
+        missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
+        if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
-        if written < SINCE_SKY and isinstance(value.get("skinned"), dict):
-            value = {**value, "skinned": {"num_sky": 0, **value["skinned"]}}
         value = {**value, "version": VERSION, **dict.fromkeys(missing)}
         if "persona" in value:
             value = {**value, "persona": with_defaults(value["persona"])}

@@ -16,7 +16,6 @@ _DTYPES = {
     "I16": np.dtype("<i2"),
     "I8": np.dtype("i1"),
     "U8": np.dtype("u1"),
-    "U16": np.dtype("<u2"),
 }
 _MAX_HEADER_BYTES = 1 << 16
 QUAT_UNIT = 32767

@@ -18,9 +18,5 @@ EDGE = 0.002
 """Metres over which depth goes from shadow to light, so that rounding is not seen."""
 FAR = -1e9
 """Metres towards the lamp where no sphere lies."""
-SKY = 24
-"""Directions from which light from all around is looked for, in as many such maps."""
-SKY_LEAST = 0.05
-"""Share of the light from all around that reaches the deepest fold: surfaces light each other."""
 WRAP = 0.2
 """Cosine by which a lamp reaches past the edge of its light: skin and cloth are soft."""

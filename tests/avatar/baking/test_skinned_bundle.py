@@ -130,7 +130,7 @@ def test_the_command_writes_what_the_page_plays(person, tmp_path, capsys):
     assert bundle.skinned is not None and manifest.body is None and manifest.name == "a"
     assert manifest.loss.psnr_baked_vs_exact is not None and strip.is_file()
     assert (
-        manifest.files[SKINNED].size < 393 * 108 + 17 * CASTERS + FRAMES * (9 * 8 + 12 + 32) + 4000
+        manifest.files[SKINNED].size < 393 * 96 + 14 * CASTERS + FRAMES * (9 * 8 + 12 + 32) + 4000
     )
     camera = visitor_camera(manifest.camera, 90, 120)
     behind = torch.tensor(manifest.background)

@@ -43,12 +43,10 @@ def turning(moments: int = 6, count: int = 300, unseen: float = 0.2) -> tuple[Se
         return torch.stack([reached(p, n, bar, direction) for p, n in both])
 
     flat, share = normals.flatten(0, 1), reach(LAMP).flatten()
-    sky = 0.3 + 0.7 * torch.rand(moments, count, generator=generator)
-    lamp = lamp_lit(flat, share, LAMP, STRENGTH, sky.flatten())
-    added = lit(flat, 0.2 * light) + lamp
+    added = lit(flat, 0.2 * light) + lamp_lit(flat, share, LAMP, STRENGTH)
     colors = (albedo + added.unflatten(0, (moments, count))).sigmoid()
     colors[torch.rand(moments, count, generator=generator) < unseen] = math.nan
-    return Seen(colors, normals, sky, reach), 0.2 * light
+    return Seen(colors, normals, reach), 0.2 * light
 
 
 def test_a_lamp_is_found_by_its_shadow():

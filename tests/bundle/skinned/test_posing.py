@@ -29,7 +29,6 @@ def loop_evaluation(baked, pose) -> list[np.ndarray]:
     """Slowly, from the format's description alone."""
     turned, places = baked.rig.posed(pose.rotations, pose.root)
     means, quats, colors = [], [], []
-    spheres = slow_spheres(baked.lamp, turned, places, baked.rig.joints)
     for n in range(baked.info.num_gaussians):
         rest, logits = baked.means[n].astype(float), baked.color_logits[n].astype(float)
         for k, much in enumerate(pose.residual):
@@ -46,60 +45,35 @@ def loop_evaluation(baked, pose) -> list[np.ndarray]:
         light += [b * (3 * z * z - 1), -a * x * z, a / 2 * (x * x - y * y)]
         facing = np.array([x, y, z])
         logits = logits + np.array(light) @ baked.light
-        reach = slow_reach(spheres, baked.lamp.lamp_direction, mean + 0.01 * facing)
+        reach = slow_reach(baked.lamp, turned, places, baked.rig.joints, mean + 0.01 * facing)
         lit = max(facing @ baked.lamp.lamp_direction + 0.2, 0)
-        sky = sum(
-            part / 255 * slow_sky(baked, m, turned, spheres)
-            for m, part in zip(baked.sky.sky_casters[n], baked.sky.sky_weights[n], strict=True)
-        )
-        logits = logits + np.log(sky + reach * lit * baked.lamp.lamp_strength)
+        logits = logits + np.log(1 + reach * lit * baked.lamp.lamp_strength)
         means.append(mean)
         quats.append(normalized(multiply(quat, baked.quats[n].astype(float))))
         colors.append(1 / (1 + np.exp(-logits)))
     return [np.array(values) for values in (means, quats, colors)]
 
 
-def slow_sky(baked, m, turned, spheres) -> float:
-    """Share of the light from all around above a sphere, direction by direction."""
-    lamp, facing = baked.lamp, np.zeros(3)
-    for joint, weight in zip(lamp.caster_joints[m], lamp.caster_weights[m] / 255, strict=True):
-        facing += weight * rotate(turned[joint], baked.sky.caster_normals[m].astype(float))
-    facing /= np.linalg.norm(facing)
-    skin = spheres[m] + (0.02 + 0.01) * facing
-    seen, possible, count = 0.0, 0.0, baked.info.num_sky
-    for i in range(count):
-        z, angle = 1 - 2 * i / (count - 1), i * math.pi * (3 - math.sqrt(5))
-        across = math.sqrt(max(1 - z * z, 0))
-        way = np.array([across * math.cos(angle), across * math.sin(angle), z])
-        cosine = max(facing @ way, 0)
-        if cosine > 0:
-            seen += cosine * slow_reach(spheres, way, skin)
-        possible += cosine
-    return max(seen / possible, 0.05)
-
-
-def slow_spheres(lamp, turned, places, joints) -> np.ndarray:
-    """(M, 3) where the centres are, sphere by sphere."""
-    centres = np.zeros((len(lamp.caster_points), 3))
-    for m, rest in enumerate(lamp.caster_points * 1e-4):
-        for joint, weight in zip(lamp.caster_joints[m], lamp.caster_weights[m] / 255, strict=True):
-            moved = rotate(turned[joint], rest - joints[joint]) + places[joint]
-            centres[m] += weight * moved
-    return centres
-
-
-def slow_reach(centres, direction, point) -> float:
-    """Share of a distant light at a point, texel by texel."""
-    towards = direction.astype(float)
-    up = [0, 1, 0] if abs(towards[1]) < 0.99 else [0, 0, 1]
-    across = np.cross(up, towards) / np.linalg.norm(np.cross(up, towards))
+def slow_reach(lamp, turned, places, joints, point) -> float:
+    """Share of the lamp's light at a point, sphere by sphere."""
+    towards = lamp.lamp_direction.astype(float)
+    across = np.cross([0, 1, 0], towards) / np.linalg.norm(np.cross([0, 1, 0], towards))
     axes = np.stack([across, np.cross(towards, across), towards])
     share, (u, v, height) = 0.0, axes @ point
-    x, y, z = (centres @ axes.T).T
+    spheres = []
+    for rest, carried, parts in zip(
+        lamp.caster_points * 1e-4, lamp.caster_joints, lamp.caster_weights / 255, strict=True
+    ):
+        centre = np.zeros(3)
+        for joint, weight in zip(carried, parts, strict=True):
+            centre += weight * (rotate(turned[joint], rest - joints[joint]) + places[joint])
+        spheres.append(axes @ centre)
     for row in range(math.floor(v / 0.0125) - 1, math.floor(v / 0.0125) + 3):
         for column in range(math.floor(u / 0.0125) - 1, math.floor(u / 0.0125) + 3):
-            left = 0.02**2 - (column * 0.0125 - x) ** 2 - (row * 0.0125 - y) ** 2  # (M,)
-            nearest = max((z + np.sqrt(np.maximum(left, 0)))[left >= 0], default=-math.inf)
+            nearest = -math.inf
+            for x, y, z in spheres:
+                left = 0.02**2 - (column * 0.0125 - x) ** 2 - (row * 0.0125 - y) ** 2
+                nearest = max(nearest, z + math.sqrt(left)) if left >= 0 else nearest
             weight = (1 - abs(u / 0.0125 - column) / 2) * (1 - abs(v / 0.0125 - row) / 2)
             share += weight / 4 * min(max((height + 0.03 - nearest) / 0.002 + 0.5, 0), 1)
     return share

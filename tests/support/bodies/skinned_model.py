@@ -44,13 +44,6 @@ def trained_like(baked: BakedSkinned, shapes: bool = True, light: bool = True) -
             "caster_joints": lamp.caster_joints.astype(np.int32),
             "caster_weights": lamp.caster_weights / np.float32(255),
         }
-    sky = baked.sky if light else None
-    if sky:
-        arrays |= {
-            "caster_normals": sky.caster_normals / np.float32(127),
-            "sky_casters": sky.sky_casters.astype(np.int32),
-            "sky_weights": sky.sky_weights / np.float32(255),
-        }
     values = {name: torch.as_tensor(array) for name, array in arrays.items()}
     values["pose_rotations"] = rotations
     values["pose_roots"] = torch.from_numpy(baked.roots.copy())
@@ -59,7 +52,7 @@ def trained_like(baked: BakedSkinned, shapes: bool = True, light: bool = True) -
     network = initial_network(rotations, HIDDEN, info.num_shapes, generator)
     network["bias1"] = torch.linspace(-5, 5, info.num_shapes)
     values |= {NETWORK + name: value for name, value in network.items()}
-    lit = light, lamp is not None, info.num_sky if sky else 0
+    lit = light, lamp is not None
     motion = Skinned(info.names, info.parents, info.num_frames, count, HIDDEN, *lit)
     gaussians = {name: values[name] for name in (*CANONICAL, *motion.per_gaussian)}
     return WindowModel(motion, gaussians, {name: values[name] for name in motion.shared})

@@ -11,7 +11,6 @@ from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_weights
-from ico3d.bundle.skinned.sky import BakedSky
 from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.rig.pose_regression import kernel_width
 from support.bundles.random_body import body_manifest, random_windows
@@ -20,7 +19,6 @@ from support.bundles.random_bundle import thumbnail
 NAMES = ("root", "chest", "left arm", "left hand", "head")
 PARENTS = (-1, 0, 1, 2, 1)
 CASTERS = 150
-SKY = 4
 REST = ((0, 1, 0), (0, 1.3, 0), (0.2, 1.4, 0), (0.5, 1.4, 0), (0, 1.5, 0))
 
 
@@ -38,9 +36,8 @@ def random_skinned(
     bone = rng.integers(0, len(NAMES), (count, 4))
     low, high = (0.0, 0.5, -0.5), (1.0, 2.0, 0.5)
     info = SkinnedInfo(
-        15.0, frames, count, shapes, len(moving), len(known), NAMES, PARENTS, low, high,
-        CASTERS, num_sky=SKY,
-    )  # fmt: skip
+        15.0, frames, count, shapes, len(moving), len(known), NAMES, PARENTS, low, high, CASTERS
+    )
     return BakedSkinned(
         means=(joints[bone[:, 0]] + rng.normal(0, 0.1, (count, 3))).astype(np.float32),
         quats=packed_quats(rng.normal(size=(count, 4))),
@@ -63,11 +60,6 @@ def random_skinned(
         kernel_width=np.array([kernel_width(rotations[known] / QUAT_UNIT)], np.float32),
         info=info,
         lamp=_lamp(rng, joints),
-        sky=BakedSky(
-            caster_normals=rng.integers(1, 128, (CASTERS, 3)).astype(np.int8),
-            sky_casters=rng.integers(0, CASTERS, (count, 4)).astype(np.uint16),
-            sky_weights=packed_weights(rng.dirichlet(np.ones(4), count)),
-        ),
     )
 
 

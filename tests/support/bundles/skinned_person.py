@@ -4,16 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import torch
 
-from ico3d.body.skinning.sky import sky_carriers
 from ico3d.bundle.format import write_bundle
 from ico3d.bundle.manifest import CameraInfo, Manifest
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
-from ico3d.bundle.skinned.sky import BakedSky
 from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.rig.pose_regression import kernel_width
 from ico3d.rig.quaternions import Array, from_rotvec
@@ -21,7 +18,7 @@ from ico3d.rig.shadow_map import RADIUS
 from support.bundles.random_body import body_manifest, random_windows
 from support.bundles.random_bundle import thumbnail
 
-FPS, FRAMES, SHAPES, CASTERS, SKY = 15.0, 31, 8, 2000, 16
+FPS, FRAMES, SHAPES, CASTERS = 15.0, 31, 8, 2000
 BONES = {  # joint: (parent, place, end of the capsule, radius)
     "hips": (None, (0.0, 0.95, 0.0), (0.0, 1.1, 0.0), 0.14),
     "chest": ("hips", (0.0, 1.15, 0.0), (0.0, 1.42, 0.0), 0.15),
@@ -60,9 +57,8 @@ def capsule_person(count: int, frames: int = FRAMES, seed: int = 0) -> BakedSkin
     known = np.arange(0, frames, 2, dtype=np.int16)
     info = SkinnedInfo(
         FPS, frames, count, SHAPES, len(moving), len(known), NAMES, PARENTS,
-        (-0.8, 0.0, -0.4), (0.8, 1.9, 0.6), CASTERS, num_sky=SKY,
+        (-0.8, 0.0, -0.4), (0.8, 1.9, 0.6), CASTERS,
     )  # fmt: skip
-    lamp, facing = _lamp(starts, ends, radii, sizes)
     phases = np.linspace(0, 2 * np.pi, frames)[:, None]
     return BakedSkinned(
         means=means.astype(np.float32),
@@ -85,16 +81,12 @@ def capsule_person(count: int, frames: int = FRAMES, seed: int = 0) -> BakedSkin
         known=known,
         kernel_width=np.array([kernel_width(rotations[known] / QUAT_UNIT)], np.float32),
         info=info,
-        lamp=lamp,
-        sky=_sky(lamp, facing, means, normals),
+        lamp=_lamp(starts, ends, radii, sizes),
     )
 
 
-def _lamp(starts: Array, ends: Array, radii: Array, sizes: Array) -> tuple[BakedLamp, np.ndarray]:
-    """Under the skin, lit from above and the left, so that arms shade the trunk.
-
-    Also directions (M, 3) out of the body.
-    """
+def _lamp(starts: Array, ends: Array, radii: Array, sizes: Array) -> BakedLamp:
+    """Under the skin, lit from above and the left, so that arms shade the trunk."""
     rng = np.random.default_rng(7)
     bone = rng.choice(len(BONES), CASTERS, p=sizes / sizes.sum())  # (M,)
     outward = rng.normal(size=(CASTERS, 3))
@@ -102,27 +94,12 @@ def _lamp(starts: Array, ends: Array, radii: Array, sizes: Array) -> tuple[Baked
     points = starts[bone] + rng.uniform(0, 1, (CASTERS, 1)) * (ends - starts)[bone]
     points += outward * (radii[bone, None] - RADIUS)
     joints, weights = _carried(points, starts, ends, radii)
-    lamp = BakedLamp(
+    return BakedLamp(
         lamp_direction=np.array([0.6, 0.48, 0.64], np.float32),
         lamp_strength=np.array([1.3, 1.1, 0.8], np.float32),
         caster_points=np.rint(points / POINT_UNIT).astype(np.int16),
         caster_joints=joints,
         caster_weights=packed_weights(weights),
-    )
-    return lamp, outward
-
-
-def _sky(lamp: BakedLamp, facing: Array, means: Array, normals: Array) -> BakedSky:
-    """By the spheres that are nearest at rest."""
-    at_rest = {
-        "caster_points": torch.from_numpy(lamp.caster_points * POINT_UNIT),
-        "caster_normals": torch.from_numpy(facing),
-    }
-    seen = sky_carriers(means, normals, at_rest)
-    return BakedSky(
-        caster_normals=np.rint(facing * 127).astype(np.int8),
-        sky_casters=seen["sky_casters"].numpy().astype(np.uint16),
-        sky_weights=packed_weights(seen["sky_weights"].numpy()),
     )
 
 

@@ -9,7 +9,6 @@ import {
   MAX_GAUSSIANS,
   MAX_JOINTS,
   MAX_SHAPES,
-  MAX_SKY,
   MOST,
   OLDEST_BUNDLE,
 } from '../shared.ts';
@@ -70,7 +69,6 @@ export interface SkinnedInfo {
   high: [number, number, number];
   num_casters: number; // spheres that cast shadows; 0 without a lamp
   num_rest: number; // of the Gaussians, in a file of their own
-  num_sky: number; // directions from which light from all around is looked for; 0 where the body hides none
 }
 
 /** Whose the head or the body is, where they come from different people. */
@@ -167,7 +165,7 @@ export function isSynthetic({ kind }: { kind: string }): boolean {
 }
 
 function withDefaults(info: SkinnedInfo): SkinnedInfo {
-  return { ...info, num_casters: info.num_casters ?? 0, num_rest: info.num_rest ?? 0, num_sky: info.num_sky ?? 0 };
+  return { ...info, num_casters: info.num_casters ?? 0, num_rest: info.num_rest ?? 0 };
 }
 
 /** Whether so many of all Gaussians may lie in a file of their own. */
@@ -224,8 +222,6 @@ function checkSkinned(info: SkinnedInfo): void {
   if (info.num_frames < 2) bad('skinned.num_frames');
   if (!isRest(info.num_rest, info.num_gaussians)) bad('skinned.num_rest');
   if (info.num_casters !== 0 && !isCount(info.num_casters, MAX_CASTERS)) bad('skinned.num_casters');
-  const around = isCount(info.num_sky, MAX_SKY) && info.num_sky > 1 && info.num_casters > 0;
-  if (info.num_sky !== 0 && !around) bad('skinned.num_sky');
 }
 
 /** Frames of a body of windows. */

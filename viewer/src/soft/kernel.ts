@@ -10,7 +10,7 @@ export interface Kernel {
   addStill(view: number, rows: number, count: number): void;
   addHead(view: number, rows: number, count: number, values: number, rank: number): void;
   addWindow(view: number, rows: number, count: number, values: number, positions: number, rotations: number, scales: number, row: number): void;
-  addSkinned(view: number, rows: number, count: number, values: number, shapes: number, joints: number, side: number, hides: number): void;
+  addSkinned(view: number, rows: number, count: number, values: number, shapes: number, joints: number, side: number): void;
   bin(all: number): number;
   spread(colours: number, columns: number, step: number, behind: number, stride: number): void;
   draw(behind: number, pixels: number, stride: number, keep: number): number;

@@ -162,7 +162,7 @@ export class Rasteriser {
     if (source.kind === 'still') kernel.addStill(from, at, count);
     else if (source.kind === 'head') kernel.addHead(from, at, count, given, a!);
     else if (source.kind === 'window') kernel.addWindow(from, at, count, given, a!, b!, c!, d!);
-    else kernel.addSkinned(from, at, count, given, a!, b!, c!, d!);
+    else kernel.addSkinned(from, at, count, given, a!, b!, c!);
   }
 
   /** Makes room for what a picture needs at most. */

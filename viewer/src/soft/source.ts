@@ -17,7 +17,7 @@ export interface Source {
   /**
    * - `head`: K.
    * - `window`: P, R, L, numbers in a cluster's row of values.
-   * - `skinned`: K, joints, texels along a side of the shadow map or 0, 1 where the sky is hidden or 0.
+   * - `skinned`: K, joints, texels along a side of the shadow map or 0.
    */
   sizes: number[];
 }
@@ -47,7 +47,7 @@ export interface SoftObject {
    * - `head`: K coefficients; motion of the shoulders, rotation wxyz and shift (7).
    * - `window`: a row for each cluster.
    * - `skinned`: light (8,4), lamp (5,4), K ≤ 8 coefficients of the shapes in 8 places, table of joints
-   *   (J,16), shadow map, share of the light from all around that reaches each Gaussian (N).
+   *   (J,16), shadow map.
    */
   readonly values: Float32Array;
 }

@@ -73,8 +73,6 @@ describe('a body on a skeleton that Python baked', () => {
       const placed = [{ id: 0, view, drawn: soft.drawn, values: soft.values }];
       const picture = rasteriser.draw({ lens, width: WIDTH, height: HEIGHT, band: [0, WIDTH / TILE_WIDTH], placed }, cloth).filter((_, at) => at % 4 < 3);
       expect(psnr(picture, reference.pictures!.subarray(i * picture.length, (i + 1) * picture.length)), `moment ${i}`).toBeGreaterThan(50);
-      const shares = body.sky!.shares.subarray(0, info.num_gaussians);
-      expect(Math.max(...shares) - Math.min(...shares)).toBeGreaterThan(0.3); // what is compared hangs on it
     }
   });
 
@@ -121,16 +119,9 @@ describe('a body on a skeleton that Python baked', () => {
   });
 
   test('an older one has no lamp', () => {
-    const { num_casters: _, num_sky: __, ...older } = info;
-    expect(checkManifest({ ...manifest, skinned: older }).skinned).toMatchObject({ num_casters: 0, num_sky: 0 });
-    expect(readBakedSkinned(tensors(), { ...info, num_casters: 0, num_sky: 0 }, SKINNED)).toMatchObject({ lamp: null, sky: null });
-  });
-
-  test('one with a lamp and no sky is lit all around', () => {
-    const { num_sky: _, ...older } = info;
-    const found = checkManifest({ ...manifest, skinned: older }).skinned!;
-    const { lamp, sky } = readBakedSkinned(tensors(), found, SKINNED);
-    expect([found.num_sky, lamp!.normals, sky]).toEqual([0, null, null]);
+    const { num_casters: _, ...older } = info;
+    expect(checkManifest({ ...manifest, skinned: older }).skinned!.num_casters).toBe(0);
+    expect(readBakedSkinned(tensors(), { ...info, num_casters: 0 }, SKINNED).lamp).toBeNull();
   });
 
   test('is as long as it was recorded', () => expect(bodyOf(manifest)).toMatchObject({ fps: 15, frames: 31 }));
@@ -163,11 +154,6 @@ describe('a damaged body on a skeleton is refused in one sentence', () => {
     ['a lamp nowhere', spoil('lamp_direction', ({ data }) => data.fill(0)), /lamp_direction/],
     ['a lamp that darkens', spoil('lamp_strength', ({ data }) => (data[1] = -1)), /lamp_strength/],
     ['too many spheres', field({ num_casters: 1e6 }), /num_casters/],
-    ['a sphere that is not there', spoil('sky_casters', ({ data }) => (data[9] = info.num_casters)), /sky_casters names one/],
-    ['spheres that face nowhere', spoil('caster_normals', (tensor) => tensor.shape[0]!--), /caster_normals is I8/],
-    ['too many directions', field({ num_sky: 65 }), /num_sky/],
-    ['one direction', field({ num_sky: 1 }), /num_sky/],
-    ['a sky without spheres', field({ num_casters: 0 }), /num_sky/],
     ['other length', spoil('rotations', (tensor) => tensor.shape[0]!--), /rotations is I16/],
     ['two bodies', () => checkManifest({ ...manifest, body: { fps: 1 } }), /skinned/],
     ['no joints', field({ names: [] }), /skinned.names/],

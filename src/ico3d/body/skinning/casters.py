@@ -31,7 +31,6 @@ def caster_tensors(casters: Skin) -> dict[str, Tensor]:
         "caster_points": torch.from_numpy(casters.points).float(),
         "caster_joints": torch.from_numpy(binding.joints.astype(np.int32)),
         "caster_weights": torch.from_numpy(binding.weights).float(),
-        "caster_normals": torch.from_numpy(casters.normals).float(),
     }
 
 

@@ -29,14 +29,8 @@ def lit(normals: Tensor, light: Tensor) -> Tensor:
     return polynomials @ (_harmonics_of_polynomials().to(light) @ light)
 
 
-def lamp_lit(
-    normals: Tensor,
-    reach: Tensor,
-    direction: Tensor,
-    strength: Tensor,
-    sky: Tensor | float = 1.0,
-) -> Tensor:
-    """What a distant lamp adds to the colour logits of surfaces, and what they lose by hidden sky.
+def lamp_lit(normals: Tensor, reach: Tensor, direction: Tensor, strength: Tensor) -> Tensor:
+    """What a distant lamp adds to the colour logits of surfaces.
 
     Of dark colours, logits are the logarithm: light from all around adds to them what it
     multiplies colours by, and the lamp adds itself to that light.
@@ -47,14 +41,12 @@ def lamp_lit(
         direction: (3,) unit vector towards the lamp.
         strength: (3,) logarithms of its light where it falls straight on, RGB, in units of the
             light from all around.
-        sky: (N,) share of the light from all around that reaches them, above 0.
 
     Returns:
-        (N, 3), at least 0 where all of the sky is seen.
+        (N, 3), at least 0.
     """
     facing = (normals @ direction + WRAP).clamp_min(0)  # (N,)
-    around = torch.as_tensor(sky).to(reach).expand_as(reach)[:, None]  # (N, 1)
-    return torch.log(around + (reach * facing)[:, None] * strength.exp())
+    return torch.log1p((reach * facing)[:, None] * strength.exp())
 
 
 @cache

@@ -13,7 +13,6 @@ from ico3d.body.skinning.blending import Posed, blended
 from ico3d.body.skinning.kinematics import transforms
 from ico3d.body.skinning.light import lamp_lit, lit
 from ico3d.body.skinning.shadow import posed_casters, reached
-from ico3d.body.skinning.sky import carried, seen_sky, turned
 from ico3d.errors import SettingsError
 from ico3d.rig import quaternions
 from ico3d.splat.gaussians import Gaussians
@@ -24,8 +23,6 @@ LAMP = ("lamp_direction", "lamp_strength")
 """Tensors of the lamp."""
 CASTERS = ("caster_points", "caster_joints", "caster_weights")
 """Tensors of the spheres that cast shadows."""
-SKY = ("sky_casters", "sky_weights")
-"""Tensors of the Gaussians that say above which spheres they see the sky."""
 PER_FRAME = ("pose_rotations", "pose_roots")
 """Tensors with one row per frame: a picture gives a gradient to one row only."""
 ON_FRAME = 1e-3
@@ -56,8 +53,7 @@ class Skinned:
     the pose's coefficient κ_k of residual shape k. Its rotation is the blended quaternion of the
     joints times the Gaussian's own. Its colour logits are those of the canonical Gaussian, plus
     Σ_k κ_k Δc_k, plus the light's spherical harmonics at the posed normal, plus what a
-    lamp adds where no part of the body stands before it, and what light from all around loses
-    where the body hides it from itself.
+    lamp adds where no part of the body stands before it.
 
     Attributes:
         names: Names of the J joints.
@@ -67,8 +63,6 @@ class Skinned:
         hidden: Width of the hidden layer of the network that gives their coefficients.
         light: Whether colours depend on the direction in which the posed surface faces.
         shadow: Whether a lamp lights the body, which casts a shadow on itself; only with `light`.
-        sky: Number of directions from which light from all around is looked for; 0 where the body
-            hides none of it from itself. Only with `shadow`.
     """
 
     names: tuple[str, ...]
@@ -78,7 +72,6 @@ class Skinned:
     hidden: int
     light: bool
     shadow: bool = False
-    sky: int = 0
 
     def __post_init__(self):
         """Checks the numbers.
@@ -97,13 +90,11 @@ class Skinned:
         """Names of the tensors of the Gaussians beside `CANONICAL`.
 
         They are `skin_joints` (N, 4) int32 and `skin_logits` (N, 4), whose softmax gives weights;
-        with light `normals` (N, 3) at rest; with a sky `sky_casters` (N, 4) int32, the spheres
-        above which they see it, and `sky_weights` (N, 4); with residual shapes `shape_means`
-        (N, 3, K), metres in rest space, and `shape_colors` (N, 3, K), logits.
+        with light `normals` (N, 3) at rest; with residual shapes `shape_means` (N, 3, K), metres in
+        rest space, and `shape_colors` (N, 3, K), logits.
         """
         names = ("skin_joints", "skin_logits")
         names += ("normals",) if self.light else ()
-        names += SKY if self.sky else ()
         return (*names, "shape_means", "shape_colors") if self.shapes else names
 
     @property
@@ -115,12 +106,11 @@ class Skinned:
         the tensors of the network that gives their coefficients. With a shadow `lamp_direction`
         (3,), a unit vector, and `lamp_strength` (3,), logarithms; and the spheres that cast it:
         `caster_points` (M, 3) metres at rest, `caster_joints` (M, 4) int32 and `caster_weights`
-        (M, 4); with a sky `caster_normals` (M, 3), out of the body at rest.
+        (M, 4).
         """
         names = ("rig_joints", "pose_rotations", "pose_roots")
         names += ("light",) if self.light else ()
         names += (*LAMP, *CASTERS) if self.shadow else ()
-        names += ("caster_normals",) if self.sky else ()
         layers = coefficients.LAYERS if self.shapes else ()
         return (*names, *(NETWORK + layer for layer in layers))
 
@@ -130,8 +120,7 @@ class Skinned:
 
         Learning the weights gains nothing where those of the template are good (docs/choices.md).
         """
-        hung = ("skin_joints", "skin_logits", "normals", *SKY)
-        return (*hung, "lamp_direction", *CASTERS, "caster_normals")
+        return ("skin_joints", "skin_logits", "normals", "lamp_direction", *CASTERS)
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
         """Activated Gaussians in the world at τ; between two frames in an interpolated pose."""
@@ -210,20 +199,10 @@ class Skinned:
         around = lit(normals, values["light"])
         if not self.shadow:
             return around
-        table = table.detach()
-        casters = posed_casters(table, *(values[name] for name in CASTERS))
+        casters = posed_casters(table.detach(), *(values[name] for name in CASTERS))
         direction, strength = (values[name] for name in LAMP)
         reach = reached(posed.means, normals, casters, direction)  # (N,)
-        sky = self._sky(values, table, casters)
-        return around + lamp_lit(normals, reach, direction, strength, sky)
-
-    def _sky(self, values: Mapping[str, Tensor], table: Tensor, casters: Tensor) -> Tensor | float:
-        """(N,) share of the light from all around that reaches Gaussians, or all of it."""
-        if not self.sky:
-            return 1.0
-        hung = (values["caster_joints"], values["caster_weights"])
-        facing = turned(table, values["caster_normals"], *hung)  # (M, 3)
-        return carried(seen_sky(casters, facing, self.sky), *(values[name] for name in SKY))
+        return around + lamp_lit(normals, reach, direction, strength)
 
 
 def without_residual(pose: Pose) -> Pose:

@@ -19,13 +19,11 @@ from ico3d.body.skinning.blending import blended
 from ico3d.body.skinning.kinematics import transforms
 from ico3d.body.skinning.light import lamp_lit
 from ico3d.body.skinning.shadow import lamp_axes, posed_casters, reached
-from ico3d.body.skinning.sky import carried, seen_sky, sky_carriers, turned
 from ico3d.body.skinning.template import hung_logits, sampled
 from ico3d.body.training.surface_points import seen_colors
 from ico3d.capture.capture import Capture
 from ico3d.common.spread import directions
 from ico3d.rig.body_track import BodyTrack
-from ico3d.rig.shadow_map import SKY
 from ico3d.splat import harmonics
 
 POINTS = 2_500
@@ -70,13 +68,11 @@ class Seen:
     Attributes:
         colors: (T, P, 3) in [0, 1]; NaN where no picture shows a point.
         normals: (T, P, 3) unit vectors.
-        sky: (T, P) share of the light from all around that reaches them.
         reach: Gives the share of light (T, P) that reaches them from a direction (3,).
     """
 
     colors: Tensor
     normals: Tensor
-    sky: Tensor
     reach: Callable[[Tensor], Tensor]
 
 
@@ -100,11 +96,7 @@ def find_lighting(
     still = torch.zeros(len(skin), 4)
     posed = [blended(table, *hung, rest, still, normals) for table in tables]
     facing = [normalize(p.normals, dim=1) for p in posed]
-    at_rest = casters["caster_points"], casters["caster_joints"], casters["caster_weights"]
-    spheres = [posed_casters(table, *at_rest) for table in tables]
-    out = [turned(table, casters["caster_normals"], *at_rest[1:]) for table in tables]
-    over = sky_carriers(skin.points, skin.normals, casters).values()
-    sky = [carried(seen_sky(s, n, SKY), *over) for s, n in zip(spheres, out, strict=True)]
+    spheres = [posed_casters(table, *casters.values()) for table in tables]
     colors = [
         torch.from_numpy(seen_colors(p.means.double().numpy(), capture, frame))
         for p, frame in zip(posed, frames, strict=True)
@@ -117,24 +109,20 @@ def find_lighting(
         ]
         return torch.stack(lit)
 
-    return regressed(Seen(torch.stack(colors), torch.stack(facing), torch.stack(sky), reach))
+    return regressed(Seen(torch.stack(colors), torch.stack(facing), reach))
 
 
 def regressed(seen: Seen) -> Lighting:
     """The light by which colours of points change least, once it is taken off them.
 
     Weighted least squares in logits, each point with a colour of its own. Directions are tried one
-    by one, and finer about the best, from which the search goes on while a neighbour is better.
+    by one, and finer about the best.
     """
     regression = _Regression(seen)
     found = min(map(regression.tried, _all_around()), key=lambda one: one[0])
     for degrees in FINER:
-        better = True
-        while better:
-            around = [regression.tried(way) for way in _ring(found[1], degrees)]
-            nearest = min(around, key=lambda one: one[0])
-            better = nearest[0] < found[0]
-            found = nearest if better else found
+        around = [regression.tried(way) for way in _ring(found[1], degrees)]
+        found = min(found, *around, key=lambda one: one[0])
     return regression.solved(found[1])
 
 
@@ -162,8 +150,8 @@ class _Regression:
     def tried(self, direction: Tensor) -> tuple[float, Tensor]:
         """What a lamp in a direction (3,) leaves unexplained, and that direction."""
         reach = self._seen.reach(direction)  # (T, P)
-        left = torch.stack([self._unexplained(direction, reach, k) for k in COARSE])  # (S, 3)
-        return float(left.min(0).values.sum()), direction
+        left = [self._unexplained(direction, reach, k).sum() for k in COARSE]
+        return float(torch.stack(left).min()), direction
 
     def solved(self, direction: Tensor) -> Lighting:
         """The light with a lamp in a direction, each of its colours as strong as fits best."""
@@ -184,9 +172,8 @@ class _Regression:
         return self._logits - self._centred(self._lamp(direction, reach, strength))
 
     def _lamp(self, direction: Tensor, reach: Tensor, strength: Tensor) -> Tensor:
-        """(T, P, C) what a lamp adds to logits, and what hidden sky takes from them."""
-        normals, sky = self._seen.normals.flatten(0, 1), self._seen.sky.flatten()  # (T·P, …)
-        added = lamp_lit(normals, reach.flatten(), direction, strength, sky)
+        """(T, P, C) what a lamp adds to logits."""
+        added = lamp_lit(self._seen.normals.flatten(0, 1), reach.flatten(), direction, strength)
         return added.unflatten(0, reach.shape)
 
     def _centred(self, values: Tensor) -> Tensor:

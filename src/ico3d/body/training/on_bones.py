@@ -10,7 +10,6 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.skinning.kinematics import transforms
 from ico3d.body.skinning.sizes import bone_lengths, largest_log_scales
 from ico3d.body.skinning.skinned import Skinned
-from ico3d.body.skinning.sky import sky_carriers
 from ico3d.body.skinning.template import Skin, hung_logits, sampled
 from ico3d.rig.body_track import BodyTrack
 from ico3d.rig.quaternions import conjugate, multiply, normalized
@@ -84,10 +83,6 @@ class OnBones:
         chosen = chosen[times >= MOST]
         if len(chosen):
             self._hang(model, chosen)
-        if self._motion.sky:
-            places, facing = _array(values["means"]), _array(values["normals"])
-            for name, found in sky_carriers(places, facing, model.shared).items():
-                values[name].copy_(found)
         return len(chosen)
 
     def _nearest(

@@ -12,7 +12,6 @@ from ico3d.body.skinning.casters import caster_tensors, spread_casters
 from ico3d.body.skinning.coefficients import initial_network
 from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
-from ico3d.body.skinning.sky import sky_carriers
 from ico3d.body.skinning.template import Skin, hung_logits, sampled
 from ico3d.body.training.begin import Begin, round_gaussians, trespassing
 from ico3d.body.training.find_lamp import find_lighting
@@ -23,7 +22,6 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.errors import CaptureError
 from ico3d.rig.body_track import BodyTrack
-from ico3d.rig.shadow_map import SKY
 from ico3d.splat.initial import spacing
 
 SPARE = 3
@@ -66,7 +64,6 @@ def begin_skinned(
     gaussians |= _hung(skin, motion)
     if motion.shadow:
         shared |= _lamp_and_casters(capture, track, window)
-        gaussians |= sky_carriers(skin.points, skin.normals, shared)
         values = {**gaussians, **shared}
         pose = motion.pose_at(values, window.tau(window.center))
         gaussians["color_logits"] = gaussians["color_logits"] - motion.lighting(values, pose)
@@ -151,8 +148,7 @@ def _motion(
 ) -> tuple[Skinned, dict[str, Tensor]]:
     """The motion, and its shared tensors with the poses of the body track."""
     sizes, rig, frames = settings.skinning, track.rig, slice(window.first, window.last + 1)
-    shadow = sizes.light and sizes.shadow
-    lit = sizes.light, shadow, SKY * shadow
+    lit = sizes.light, sizes.light and sizes.shadow
     motion = Skinned(rig.names, rig.parents, len(window), sizes.shapes, sizes.hidden, *lit)
     shared = {
         "rig_joints": torch.from_numpy(rig.joints).float(),

@@ -7,7 +7,6 @@ import numpy as np
 
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST, SkinnedInfo
 from ico3d.bundle.skinned.lamp import BakedLamp, fault_of, lamp_spec
-from ico3d.bundle.skinned.sky import SKY_AXES, BakedSky, sky_fault, sky_spec
 from ico3d.bundle.tensors import (
     QUAT_UNIT,
     Axes,
@@ -77,7 +76,6 @@ class BakedSkinned:
             a pose's features (`posing.any_pose`).
         info: The manifest's entry about the body.
         lamp: The lamp in whose light the body casts a shadow on itself, or None.
-        sky: What tells how much of the light from all around the body hides from itself, or None.
     """
 
     means: np.ndarray
@@ -101,7 +99,6 @@ class BakedSkinned:
     kernel_width: np.ndarray
     info: SkinnedInfo
     lamp: BakedLamp | None = None
-    sky: BakedSky | None = None
 
     @cached_property
     def rig(self) -> Rig:
@@ -112,10 +109,7 @@ class BakedSkinned:
         """The body with some of its Gaussians, by indices (M,) in the order they are to have."""
         parts = {name: self.tensors[name].take(indices, axis) for name, axis in _AXES.items()}
         info = replace(self.info, num_gaussians=len(indices), num_rest=0)
-        sky = self.sky and replace(
-            self.sky, **{name: self.sky.tensors[name].take(indices, 0) for name in SKY_AXES}
-        )
-        return replace(self, **parts, info=info, sky=sky)
+        return replace(self, **parts, info=info)
 
     def to_bytes(self) -> bytes:
         """Content of the file `body/skinned.safetensors`.
@@ -137,7 +131,7 @@ class BakedSkinned:
         """
         _check_values(self)
         names = SKINNED, SKINNED_REST
-        return split_tensors(self.tensors, _spec(self.info), _axes(self.info), first, names)
+        return split_tensors(self.tensors, _spec(self.info), _AXES, first, names)
 
     @staticmethod
     def from_bytes(data: bytes, info: SkinnedInfo, rest: bytes = b"") -> "BakedSkinned":
@@ -154,27 +148,20 @@ class BakedSkinned:
         """
         if info.num_rest:
             files, names = (data, rest), (SKINNED, SKINNED_REST)
-            tensors = join_tensors(files, _spec(info), _axes(info), info.num_rest, names)
+            tensors = join_tensors(files, _spec(info), _AXES, info.num_rest, names)
         else:
             tensors = decode_tensors(data, _spec(info), SKINNED)
-        lamp = {name: tensors.pop(name) for name in lamp_spec(info)}
-        sky = {name: tensors.pop(name) for name in sky_spec(info)}
-        baked = BakedSkinned(
-            **tensors,
-            info=info,
-            lamp=BakedLamp(**lamp) if lamp else None,
-            sky=BakedSky(**sky) if sky else None,
-        )
+        found = {name: tensors.pop(name) for name in lamp_spec(info)}
+        baked = BakedSkinned(**tensors, info=info, lamp=BakedLamp(**found) if found else None)
         _check_values(baked)
         return baked
 
     @property
     def tensors(self) -> dict[str, np.ndarray]:
         """The tensors of the file by name."""
-        others = ("info", "lamp", "sky")
+        others = ("info", "lamp")
         own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in others}
-        own |= self.lamp.tensors if self.lamp else {}
-        return own | (self.sky.tensors if self.sky else {})
+        return own | (self.lamp.tensors if self.lamp else {})
 
 
 def _spec(info: SkinnedInfo) -> Spec:
@@ -200,13 +187,7 @@ def _spec(info: SkinnedInfo) -> Spec:
         "known": ("I16", (info.num_known,)),
         "kernel_width": ("F32", (1,)),
         **lamp_spec(info),
-        **sky_spec(info),
     }
-
-
-def _axes(info: SkinnedInfo) -> Axes:
-    """Axes of the Gaussians in the tensors that have one row for each."""
-    return {**_AXES, **(SKY_AXES if info.num_sky else {})}
 
 
 def _check_values(baked: BakedSkinned) -> None:
@@ -244,7 +225,6 @@ def _check_values(baked: BakedSkinned) -> None:
     moved = reach[:, 0].max() <= _MAX_LENGTH and reach[:, 1].max() <= _MAX_LOGIT
     _require(bool(moved), "its residual shapes are out of range")
     fault = fault_of(baked.lamp, info.num_joints) if baked.lamp else None
-    fault = fault or (sky_fault(baked.sky) if baked.sky else None)
     _require(fault is None, str(fault))
     assert baked.rig  # making the rig checks its joints
 

@@ -39,8 +39,6 @@ class SkinnedInfo:
         num_casters: Number of spheres that cast shadows; 0 without a lamp.
         num_rest: Number of the Gaussians in `body/skinned_rest.safetensors`, the least important
             ones; 0 where all are in one file.
-        num_sky: Number of directions from which light from all around is looked for; 0 where the
-            body hides none of it from itself. Only with casters.
     """
 
     fps: float
@@ -55,7 +53,6 @@ class SkinnedInfo:
     high: tuple[float, float, float]
     num_casters: int = 0
     num_rest: int = 0
-    num_sky: int = 0
 
     @property
     def num_joints(self) -> int:
@@ -91,13 +88,11 @@ def check_skinned(info: SkinnedInfo, require: Require) -> None:
         "num_moving": (1, min(info.num_joints, MOST_JOINTS)),
         "num_casters": (0, limits.MAX_CASTERS),
         "num_rest": (0, info.num_gaussians - 1),
-        "num_sky": (0, limits.MAX_SKY if info.num_casters else 0),
         "num_known": (1, min(info.num_frames, limits.MAX_KNOWN_POSES)),
     }
     for name, (least, most) in ranges.items():
         inside = least <= getattr(info, name) <= most
         require(inside, f"skinned.{name}", f"lie between {least} and {most}")
-    require(info.num_sky != 1, "skinned.num_sky", "be 0, or at least 2")
     require(0 < info.fps <= 1000, "skinned.fps", "lie between 0 and 1000")
     named = all(0 < len(name) <= LONGEST_NAME for name in info.names)
     require(named, "skinned.names", f"have 1 to {LONGEST_NAME} characters each")

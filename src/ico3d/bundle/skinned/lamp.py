@@ -71,49 +71,17 @@ def fault_of(lamp: BakedLamp, num_joints: int) -> str | None:
     return None
 
 
-def lamp_light(
-    lamp: BakedLamp, table: Array, points: Array, normals: Array, sky: Array | float = 1.0
-) -> Array:
-    """(N, 3) what the lamp adds to colour logits, and what they lose by hidden sky.
+def lamp_light(lamp: BakedLamp, table: Array, points: Array, normals: Array) -> Array:
+    """(N, 3) what the lamp adds to colour logits.
 
     Args:
         lamp: The lamp.
         table: (J, 16) of `ico3d.bundle.skinned.posing.joint_table`.
         points: (N, 3) metres in the world.
         normals: (N, 3) unit vectors.
-        sky: (N,) share of the light from all around that reaches the points.
     """
-    axes = lamp_axes(lamp.lamp_direction)
-    depths = shadow_map(posed_casters(lamp, table), axes)
-    reach = reached(points, normals, axes, depths)  # (N,)
-    facing = np.maximum(normals @ lamp.lamp_direction + WRAP, 0)  # (N,)
-    around = np.broadcast_to(sky, reach.shape)[:, None]  # (N, 1)
-    return np.log(around + (reach * facing)[:, None] * lamp.lamp_strength)
-
-
-def posed_casters(lamp: BakedLamp, table: Array) -> Array:
-    """(M, 3) centres of the spheres in the world, in a pose with the joint table (J, 16)."""
-    matrices = caster_matrices(lamp, table)
-    rest = lamp.caster_points * POINT_UNIT  # (M, 3)
-    return np.einsum("mab,mb->ma", matrices[..., :3], rest) + matrices[..., 3]
-
-
-def caster_matrices(lamp: BakedLamp, table: Array) -> Array:
-    """(M, 3, 4) matrices (R | t) that move the spheres from rest to a pose."""
-    weights = lamp.caster_weights / WEIGHT_UNIT  # (M, 4)
-    mixed = np.einsum("mk,mkc->mc", weights, table[lamp.caster_joints, :12])  # (M, 12)
-    return mixed.reshape(-1, 3, 4)
-
-
-def reached(points: Array, normals: Array, axes: Array, depths: Array) -> Array:
-    """(N,) share of a distant light that reaches points on the skin.
-
-    Args:
-        points: (N, 3) metres in the world.
-        normals: (N, 3) unit vectors.
-        axes: (3, 3) of `lamp_axes`.
-        depths: (SIDE, SIDE) of `shadow_map`.
-    """
+    axes = _axes(lamp.lamp_direction)
+    depths = shadow_map(lamp, table)
     places = (points + OFF * normals) @ axes.T  # (N, 3)
     scaled = places[:, :2] / TEXEL  # (N, 2)
     corner = np.floor(scaled)
@@ -125,33 +93,39 @@ def reached(points: Array, normals: Array, axes: Array, depths: Array) -> Array:
             column, row = texel.astype(np.int64).T % SIDE
             before = places[:, 2] + BIAS - depths[row, column]  # (N,)
             reach += weight * np.clip(before / EDGE + 0.5, 0, 1)
-    return reach
+    facing = np.maximum(normals @ lamp.lamp_direction + WRAP, 0)  # (N,)
+    return np.log1p((reach * facing)[:, None] * lamp.lamp_strength)
 
 
-def shadow_map(centres: Array, axes: Array) -> Array:
-    """(SIDE, SIDE) metres towards a light that the nearest sphere reaches at each texel.
+def shadow_map(lamp: BakedLamp, table: Array) -> Array:
+    """(SIDE, SIDE) metres towards the lamp that the nearest sphere reaches at each texel.
 
     Args:
-        centres: (M, 3) of the spheres in the world, metres.
-        axes: (3, 3) of `lamp_axes`.
+        lamp: The lamp.
+        table: (J, 16) of a pose.
     """
-    seen = centres @ axes.T  # (M, 3)
+    weights = lamp.caster_weights / WEIGHT_UNIT  # (M, 4)
+    mixed = np.einsum("mk,mkc->mc", weights, table[lamp.caster_joints, :12])  # (M, 12)
+    matrices = mixed.reshape(-1, 3, 4)
+    rest = lamp.caster_points * POINT_UNIT  # (M, 3)
+    centres = np.einsum("mab,mb->ma", matrices[..., :3], rest) + matrices[..., 3]
+    centres = centres @ _axes(lamp.lamp_direction).T  # (M, 3)
     depths = np.full((SIDE, SIDE), FAR)
     reach = int(RADIUS / TEXEL) + 1
-    middle = np.rint(seen[:, :2] / TEXEL)  # (M, 2)
+    middle = np.rint(centres[:, :2] / TEXEL)  # (M, 2)
     for down in range(-reach, reach + 1):
         for right in range(-reach, reach + 1):
             texel = middle + np.array([right, down])  # (M, 2)
-            apart = np.square(texel * TEXEL - seen[:, :2]).sum(1)  # (M,)
+            apart = np.square(texel * TEXEL - centres[:, :2]).sum(1)  # (M,)
             inside = apart <= RADIUS**2
-            depth = seen[inside, 2] + np.sqrt(RADIUS**2 - apart[inside])
+            depth = centres[inside, 2] + np.sqrt(RADIUS**2 - apart[inside])
             column, row = texel[inside].astype(np.int64).T % SIDE
             np.maximum.at(depths, (row, column), depth)
     return depths
 
 
-def lamp_axes(direction: np.ndarray) -> Array:
-    """(3, 3) rows: across, up and towards a light in a direction (3,), of length 1."""
+def _axes(direction: np.ndarray) -> Array:
+    """(3, 3) rows: across, up and towards the lamp, of length 1."""
     towards = direction.astype(np.float64) / np.linalg.norm(direction)
     up = (0.0, 1.0, 0.0) if abs(towards[1]) < 0.99 else (0.0, 0.0, 1.0)
     across = np.cross(up, towards)

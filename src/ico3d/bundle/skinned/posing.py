@@ -7,7 +7,6 @@ import numpy as np
 
 from ico3d.bundle.skinned.baked import SCALE_UNITS, WEIGHT_UNIT, BakedSkinned
 from ico3d.bundle.skinned.lamp import lamp_light
-from ico3d.bundle.skinned.sky import sky_light
 from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.rig.pose_regression import PoseRegression
 from ico3d.rig.quaternions import Array, multiply, normalized, slerp
@@ -136,10 +135,7 @@ def posed(baked: BakedSkinned, pose: SkinnedPose, count: int | None = None) -> P
     logits = baked.color_logits[some].astype(np.float32) + residual[:, 3:] * units[:, 1:]
     logits = logits + harmonics(facing) @ baked.light  # (N, 3)
     if baked.lamp:
-        sky = 1.0
-        if baked.sky:
-            sky = sky_light(baked.sky, baked.lamp, baked.info.num_sky, table, some)
-        logits = logits + lamp_light(baked.lamp, table, means, facing, sky)
+        logits = logits + lamp_light(baked.lamp, table, means, facing)
     quats = normalized(multiply(mixed[:, 12:], baked.quats[some].astype(np.float32)))
     return PosedGaussians(
         means.astype(np.float32),

@@ -52,7 +52,6 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ("MAX_JOINTS", "Of a body's skeleton; rig/rig.py.", MOST_JOINTS),
     ("MAX_CLUSTERS", "Groups of Gaussians in a window that move alike.", limits.MAX_CLUSTERS),
     ("MAX_CASTERS", "Spheres that cast its shadow.", limits.MAX_CASTERS),
-    ("MAX_SKY", "Directions from which light from all around is looked for.", limits.MAX_SKY),
     (
         "SHADOW",
         "The map in which a lamp sees a body, in metres; rig/shadow_map.py.",
@@ -64,7 +63,6 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             "bias": shadow_map.BIAS,
             "edge": shadow_map.EDGE,
             "wrap": shadow_map.WRAP,
-            "skyLeast": shadow_map.SKY_LEAST,
         },
     ),
     ("MAX_NOTES", "Sentences of earlier visits; chat/wire/protocol_visits.py.", MAX_NOTES),

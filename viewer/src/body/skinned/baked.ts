@@ -15,13 +15,6 @@ export interface SkinnedRows {
   weights: Uint8Array; // (N,4) weights of these joints · 255
   shapes: Int8Array; // (N,K,6) residual shapes: changes of position and of logits
   shapeScales: Float32Array; // (N,2) millimetres and logits per unit of the shapes
-  sky: BakedSky | null;
-}
-
-/** Above which of the lamp's spheres Gaussians see the light from all around. */
-export interface BakedSky {
-  casters: Uint16Array; // (N,4) indices
-  weights: Uint8Array; // (N,4) · 255
 }
 
 /** A baked body on a skeleton (`docs/bundle.md`): its Gaussians, or the most important ones, J joints, F recorded frames. */
@@ -39,7 +32,6 @@ export interface BakedLamp {
   points: Int16Array; // (M,3) at rest, 0.1 mm
   joints: Uint8Array; // (M,4)
   weights: Uint8Array; // (M,4) · 255
-  normals: Int8Array | null; // (M,3) directions out of the body at rest, of any length; null where there is no sky
 }
 
 /** The skeleton and its recorded poses. */
@@ -91,7 +83,7 @@ export function readBakedSkinned(tensors: Map<string, Tensor>, info: SkinnedInfo
 /**
  * Takes `n` Gaussians of a body out of a file.
  *
- * @throws PageError if they do not agree with the manifest's counts, or one hangs on a joint or sphere that is not there
+ * @throws PageError if they do not agree with the manifest's counts, or one hangs on a joint that is not there
  */
 export function readSkinnedRows(tensors: Map<string, Tensor>, n: number, info: SkinnedInfo, file: string): SkinnedRows {
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
@@ -110,14 +102,7 @@ export function readSkinnedRows(tensors: Map<string, Tensor>, n: number, info: S
     weights: take('weights', 'U8', [n, 4]),
     shapes: take('shapes', 'I8', [n, info.num_shapes, 6]),
     shapeScales: take('shape_scales', 'F16', [n, 2]),
-    sky: info.num_sky ? readSky(tensors, n, info, file) : null,
   };
-}
-
-function readSky(tensors: Map<string, Tensor>, n: number, info: SkinnedInfo, file: string): BakedSky {
-  const casters = takeTensor(tensors, 'sky_casters', 'U16', [n, 4], file).data as Uint16Array;
-  if (casters.some((caster) => caster >= info.num_casters)) throw missing('sky_casters', file);
-  return { casters, weights: takeTensor(tensors, 'sky_weights', 'U8', [n, 4], file).data as Uint8Array };
 }
 
 function missing(name: string, file: string): PageError {
@@ -134,9 +119,8 @@ function readLamp(tensors: Map<string, Tensor>, info: SkinnedInfo, file: string)
     points: take('caster_points', 'I16', [m, 3]),
     joints: take('caster_joints', 'U8', [m, 4]),
     weights: take('caster_weights', 'U8', [m, 4]),
-    normals: info.num_sky ? take('caster_normals', 'I8', [m, 3]) : null,
   };
-  if (lamp.joints.some((joint) => joint >= info.names.length)) throw missing('caster_joints', file);
+  if (lamp.joints.some((joint) => joint >= info.names.length)) throw new PageError(`${file}: caster_joints names one that is not there.`);
   if (Math.abs(Math.hypot(...lamp.direction) - 1) > 1e-3) throw new PageError(`${file}: lamp_direction is not of length 1.`);
   if (lamp.strength.some((value) => value < 0)) throw new PageError(`${file}: lamp_strength must not be less than 0.`);
   return lamp;

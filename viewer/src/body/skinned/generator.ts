@@ -1,10 +1,7 @@
 import { Generator } from '../../gaussians/generator.ts';
 import type { BakedSkinned, SkinnedRows } from './baked.ts';
-import { Casters } from './casters.ts';
-import { texelsFor } from './packed.ts';
 import { ShadowMap } from './shadow.ts';
 import { placesOf, Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
-import { Sky } from './sky.ts';
 import { SoftSkinned } from './soft.ts';
 
 /** A body on a skeleton as a generator: its Gaussians move, turn and are coloured with their joints. */
@@ -19,14 +16,11 @@ export class SkinnedGenerator extends Generator {
   residual: Float64Array = new Float64Array(0);
   /** What the lamp sees, where there is one. */
   readonly map: ShadowMap | null;
-  /** How much light from all around the Gaussians get, where the body hides it from itself. */
-  readonly sky: Sky | null;
   /** Gaussians that are drawn at most. */
   most: number;
   /** Share of their opacity that Gaussians have which came later. */
   grown = 0;
   readonly soft: SoftSkinned;
-  private readonly casters: Casters | null;
 
   constructor(baked: BakedSkinned) {
     const { info, lamp } = baked;
@@ -36,10 +30,7 @@ export class SkinnedGenerator extends Generator {
     this.most = info.num_gaussians;
     this.skeleton = new Skeleton(info, baked.poses);
     this.table = new Float32Array(TABLE_ROW * info.names.length);
-    this.casters = lamp && new Casters(lamp, info.names.length);
-    this.map = this.casters && new ShadowMap(this.casters, lamp!.direction);
-    this.sky = this.casters && baked.sky && new Sky(this.casters, info.num_sky, texelsFor(info.num_gaussians));
-    this.sky?.add(baked.sky!);
+    this.map = lamp && new ShadowMap(lamp, info.names.length);
     this.soft = new SoftSkinned(this);
   }
 
@@ -47,10 +38,7 @@ export class SkinnedGenerator extends Generator {
   pose(pose: Pose): void {
     this.skeleton.table(pose, this.table);
     this.residual = pose.residual;
-    if (this.casters?.pose(this.table)) {
-      this.map!.draw();
-      this.sky?.look();
-    }
+    this.map?.draw(this.table);
     this.changed();
   }
 
@@ -62,7 +50,6 @@ export class SkinnedGenerator extends Generator {
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
   complete(rest: SkinnedRows): void {
     this.parts.push(rest);
-    this.sky?.add(rest.sky!);
     this.changed();
   }
 

@@ -14,14 +14,9 @@ export interface Texels {
   words: Uint32Array;
 }
 
-/** Texels of the rows that hold so many Gaussians. */
-export function texelsFor(count: number): number {
-  return WIDTH * Math.ceil(count / WIDTH);
-}
-
 /** Room for all Gaussians of a body. */
 export function makeTexels({ num_gaussians: count, num_shapes: shapes }: SkinnedInfo): Texels {
-  const rows = texelsFor(count) / WIDTH;
+  const rows = Math.ceil(count / WIDTH);
   const layers = 3 + Math.ceil((SHAPE * shapes) / TEXEL);
   return { width: WIDTH, rows, layers, words: new Uint32Array(4 * WIDTH * rows * layers) };
 }

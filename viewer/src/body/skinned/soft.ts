@@ -3,7 +3,6 @@ import { PackedParts } from '../../soft/parts.ts';
 import { makeRows, ROW_BYTES, type Late, type SoftObject, type Source } from '../../soft/source.ts';
 import type { BakedSkinned, SkinnedRows } from './baked.ts';
 import type { ShadowMap } from './shadow.ts';
-import type { Sky } from './sky.ts';
 
 const MILLIMETRE = 1e-3;
 const LAMP = 4 * 8; // where it begins among the values, behind the light
@@ -18,7 +17,6 @@ export interface SkinnedNow {
   readonly table: Float32Array; // (J,TABLE_ROW) joints
   readonly residual: Float64Array; // (K,) coefficients of the shapes
   readonly map: ShadowMap | null;
-  readonly sky: Sky | null;
   readonly most: number; // Gaussians that are drawn
   readonly grown: number; // share of what came after the first part that is seen
 }
@@ -31,10 +29,10 @@ export class SoftSkinned implements SoftObject {
   private version = -1; // of the body, whose values were written
 
   constructor(body: SkinnedNow) {
-    const { baked: { info, light, lamp }, map, sky, table } = body;
+    const { baked: { info, light, lamp }, map, table } = body;
     this.body = body;
-    this.packed = new PackedParts(body.parts, (rows) => pack(rows, info, map ? SHADOW.side : 0, sky !== null));
-    this.written = new Float32Array(TABLE + table.length + (map?.depths.length ?? 0) + (sky?.shares.length ?? 0));
+    this.packed = new PackedParts(body.parts, (rows) => pack(rows, info, map ? SHADOW.side : 0));
+    this.written = new Float32Array(TABLE + table.length + (map?.depths.length ?? 0));
     for (let k = 0; k < 8; k++) this.written.set(light.subarray(3 * k, 3 * k + 3), 4 * k);
     if (!lamp || !map) return;
     for (let k = 0; k < 3; k++) this.written.set(map.axes.subarray(3 * k, 3 * k + 3), LAMP + 4 * k);
@@ -54,19 +52,18 @@ export class SoftSkinned implements SoftObject {
   }
 
   get values(): Float32Array {
-    const { version, table, residual, map, sky } = this.body;
+    const { version, table, residual, map } = this.body;
     if (version !== this.version) {
       this.version = version;
       this.written.set(residual, RESIDUAL);
       this.written.set(table, TABLE);
       if (map) this.written.set(map.depths, TABLE + table.length);
-      if (map && sky) this.written.set(sky.shares, TABLE + table.length + map.depths.length);
     }
     return this.written;
   }
 }
 
-function pack(baked: SkinnedRows, { num_shapes: shapes, names }: BakedSkinned['info'], side: number, sky: boolean): Source {
+function pack(baked: SkinnedRows, { num_shapes: shapes, names }: BakedSkinned['info'], side: number): Source {
   const { count } = baked;
   const stride = ROW_BYTES.skinned + 8 * shapes;
   const { rows, floats } = makeRows(count, stride);
@@ -90,5 +87,5 @@ function pack(baked: SkinnedRows, { num_shapes: shapes, names }: BakedSkinned['i
       bytes.set(new Uint8Array(baked.shapes.buffer, baked.shapes.byteOffset + from + 3, 3), to + 4);
     }
   }
-  return { kind: 'skinned', count, rows, sizes: [shapes, names.length, side, Number(sky)] };
+  return { kind: 'skinned', count, rows, sizes: [shapes, names.length, side] };
 }

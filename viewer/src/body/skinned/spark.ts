@@ -14,12 +14,11 @@ const MILLIMETRE = '1e-3';
 /** A body on a skeleton as Spark draws it: a shader moves, turns and colours its Gaussians with their joints. */
 export class SparkSkinned extends SparkTwin {
   constructor(body: SkinnedGenerator) {
-    const { baked, map, sky } = body;
+    const { baked, map } = body;
     const { info, lamp } = baked;
     const texels = makeTexels(info);
     const shadow = lamp && map && makeShadow(lamp, map);
-    const around = sky && makeTexture(sky.shares, texels.width, texels.rows);
-    const uniforms = { ...makeUniforms(body, texels), ...shadow?.uniforms, ...(around && { skinnedSky: { value: around } }) };
+    const uniforms = { ...makeUniforms(body, texels), ...shadow?.uniforms };
     let filled = 0; // parts
     let gaussians = 0;
     const follow = () => {
@@ -31,15 +30,13 @@ export class SparkSkinned extends SparkTwin {
       }
       uniforms.skinnedJoints.value.needsUpdate = true;
       if (shadow) shadow.texture.needsUpdate = true;
-      if (around) around.needsUpdate = true;
       body.residual.forEach((value, k) => uniforms.skinnedResidual.value[k >> 2]!.setComponent(k & 3, value));
       uniforms.skinnedGrown.value = body.grown;
       uniforms.skinnedCount.value = body.most;
     };
-    const declarations = [DECLARATIONS, lamp && SHADOW_DECLARATIONS, sky && 'uniform highp sampler2D skinnedSky;'];
-    const share = sky ? 'texelFetch(skinnedSky, texel, 0).r' : '1.0';
-    const lit = lamp ? ` + skinnedLampLit(centre, normal, ${share})` : '';
-    super(body, { declarations: declarations.filter(Boolean).map((text) => dyno.unindent(text!)).join('\n'), uniforms, statements: (index, gsplat) => statements(texels, info.num_shapes, lit, index, gsplat) }, follow);
+    const declarations = lamp ? DECLARATIONS + dyno.unindent(SHADOW_DECLARATIONS) : DECLARATIONS;
+    const lit = lamp ? ' + skinnedLampLit(centre, normal)' : '';
+    super(body, { declarations, uniforms, statements: (index, gsplat) => statements(texels, info.num_shapes, lit, index, gsplat) }, follow);
   }
 }
 
@@ -73,13 +70,6 @@ function makeUniforms({ baked: { info, count, light }, table }: SkinnedGenerator
   };
 }
 
-/** Numbers as a texture, one in each texel. */
-function makeTexture(numbers: Float32Array, width: number, height: number): THREE.DataTexture {
-  const texture = new THREE.DataTexture(numbers, width, height, THREE.RedFormat, THREE.FloatType);
-  texture.needsUpdate = true;
-  return texture;
-}
-
 /** What the lamp sees, as a texture, and the lamp. */
 interface Shadow {
   texture: THREE.DataTexture;
@@ -87,13 +77,14 @@ interface Shadow {
 }
 
 function makeShadow(lamp: BakedLamp, map: ShadowMap): Shadow {
-  const texture = makeTexture(map.depths, SHADOW.side, SHADOW.side);
+  const texture = new THREE.DataTexture(map.depths, SHADOW.side, SHADOW.side, THREE.RedFormat, THREE.FloatType);
+  texture.needsUpdate = true;
   const axes = [0, 3, 6].map((at) => new THREE.Vector3().fromArray(map.axes, at));
   const lit = [...axes, new THREE.Vector3().fromArray(lamp.strength)];
   return { texture, uniforms: { skinnedShadow: { value: texture }, skinnedLamp: { value: lit } } };
 }
 
-const DECLARATIONS = `
+const DECLARATIONS = dyno.unindent(`
   uniform usampler2DArray skinnedTexels;
   uniform sampler2D skinnedJoints;
   uniform vec4 skinnedResidual[2];
@@ -120,7 +111,7 @@ const DECLARATIONS = `
       + 0.31539156525252005 * (2.0 * n.z * n.z - n.x * n.x - n.y * n.y) * skinnedLight[5]
       + 0.5462742152960396 * (n.x * n.x - n.y * n.y) * skinnedLight[7];
   }
-`;
+`);
 
 /**
  * Shader code that sums the residual shapes: `moved` = Σ κ·position and `tinted` = Σ κ·logits.

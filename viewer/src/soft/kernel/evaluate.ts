@@ -162,16 +162,14 @@ const LAMP: usize = 8 * 16;
 const RESIDUAL: usize = LAMP + 5 * 16;
 const TABLE: usize = RESIDUAL + 8 * 4;
 
-/** A body on a skeleton, lit by a lamp if its map has sides, and hiding the sky from itself if it `hides`. */
-export function addSkinned(view: usize, rows: usize, count: i32, values: usize, shapes: i32, joints: i32, side: i32, hides: i32): void {
+/** A body on a skeleton. */
+export function addSkinned(view: usize, rows: usize, count: i32, values: usize, shapes: i32, joints: i32, side: i32): void {
   const stride = SKINNED + 8 * <usize>shapes;
   const end = rows + stride * <usize>count;
   const fading = rows + stride * <usize>min(late, count);
   const table = values + TABLE;
   const map = table + TABLE_ROW * <usize>joints;
-  let sky = map + <usize>(4 * side * side) - 4;
   for (let at = rows; at < end; at += stride) {
-    sky += 4;
     let x = f32x4.splat(0);
     let y = f32x4.splat(0);
     let z = f32x4.splat(0);
@@ -214,8 +212,7 @@ export function addSkinned(view: usize, rows: usize, count: i32, values: usize, 
     nz *= long;
     const logits = f32x4.add(f32x4.add(v128.load(at, 40), f32x4.mul(v128.load32_splat(at, 80), tint)), harmonics(values + LIGHT, nx, ny, nz));
     const shade = heldPowerOfTwo(f32x4.mul(logits, f32x4.splat(-LOG2_E)));
-    const around = hides ? v128.load32_splat(sky) : f32x4.splat(1);
-    const bright = side ? f32x4.add(around, lamp(values + LAMP, map, side, cx, cy, cz, nx, ny, nz)) : around;
+    const bright = side ? f32x4.add(f32x4.splat(1), lamp(values + LAMP, map, side, cx, cy, cz, nx, ny, nz)) : f32x4.splat(1);
     // sigmoid(logits + log(bright)), without the logarithm
     colour(record, f32x4.div(bright, f32x4.add(bright, shade)));
   }

@@ -15,7 +15,6 @@ from ico3d.bundle.skinned.baked import SCALE_UNITS, BakedSkinned
 from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
-from ico3d.bundle.skinned.sky import BakedSky
 from ico3d.bundle.tensors import QUAT_UNIT
 from ico3d.common.spread import spread
 from ico3d.rig.pose_regression import kernel_width
@@ -77,7 +76,6 @@ def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSk
         low=clip.low,
         high=clip.high,
         num_casters=len(shared["caster_points"]) if motion.shadow else 0,
-        num_sky=motion.sky,
     )
     return BakedSkinned(
         means=shapes.means.astype(np.float32),
@@ -95,7 +93,6 @@ def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSk
         coefficients=shapes.coefficients.astype(np.float32),
         info=info,
         lamp=_lamp(shared) if motion.shadow else None,
-        sky=_sky(shared, arrays) if motion.sky else None,
         **poses,
     )
 
@@ -108,15 +105,6 @@ def _lamp(shared: Mapping[str, Tensor]) -> BakedLamp:
         caster_points=np.rint(shared["caster_points"].numpy() / POINT_UNIT).astype(np.int16),
         caster_joints=shared["caster_joints"].numpy().astype(np.uint8),
         caster_weights=packed_weights(shared["caster_weights"].numpy()),
-    )
-
-
-def _sky(shared: Mapping[str, Tensor], arrays: Mapping[str, np.ndarray]) -> BakedSky:
-    """Where spheres face, and above which of them Gaussians see the sky."""
-    return BakedSky(
-        caster_normals=np.rint(shared["caster_normals"].numpy() * 127).astype(np.int8),
-        sky_casters=arrays["sky_casters"].astype(np.uint16),
-        sky_weights=packed_weights(arrays["sky_weights"]),
     )
 
 

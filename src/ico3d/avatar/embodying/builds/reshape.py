@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -51,7 +50,7 @@ def reshaped(body: BakedSkinned, build: BuildName) -> BakedSkinned:
     slopes = _bounded(slopes)
     touched = np.abs(slopes - np.eye(3)).max((1, 2)) > FELT
     parts = _stretched(body, slopes) if touched.any() else {}
-    kept: dict[str, Any] = {
+    kept = {
         name: np.where(_like(touched, new), new, getattr(body, name)) for name, new in parts.items()
     }
     info = replace(
