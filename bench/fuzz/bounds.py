@@ -151,8 +151,9 @@ def _work(reader: Reader, numbers: range, seed: int, bounds: Bounds, sending: in
 
 def _one(bench: Bench, files: dict[str, bytes], bounds: Bounds) -> dict:
     """Reads one input; the system ends the process where it takes too long."""
+    gc.collect()  # what earlier inputs left is no growth of this one, and its end hides none
     Path("/proc/self/clear_refs").write_text("5")  # the highest memory so far is forgotten
-    files_before, private = _memory("RssFile"), _memory("RssAnon") + _memory("RssShmem")
+    before = _resident()
     began, finding, accepted = time.process_time(), "", False
     signal.setitimer(signal.ITIMER_PROF, bounds.cpu)
     signal.setitimer(signal.ITIMER_REAL, bounds.wall)
@@ -163,8 +164,8 @@ def _one(bench: Bench, files: dict[str, bytes], bounds: Bounds) -> dict:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
-    # the system may take pages of libraries back meanwhile: they hide no growth
-    base = private + min(files_before, _memory("RssFile"))
+    # the system may take pages back meanwhile, of libraries or freed ones: they hide no growth
+    base = sum(map(min, before, _resident()))
     return {
         "refused": not accepted and not finding,
         "cpu": time.process_time() - began,
@@ -180,6 +181,11 @@ def _named(error: Exception) -> str:
     ]
     place = f" at {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
     return f"{type(error).__name__}{place}: {str(error)[:120]!r}"
+
+
+def _resident() -> tuple[int, int]:
+    """What is in memory of the process's own pages, and of files, KiB."""
+    return _memory("RssAnon") + _memory("RssShmem"), _memory("RssFile")
 
 
 def _memory(name: str) -> int:

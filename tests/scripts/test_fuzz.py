@@ -95,10 +95,24 @@ def test_the_bench_tells_what_went_wrong(part, kind, finding):
     assert outcome.inputs == 1 and found.startswith(finding) and outcome.first[found] == 0
 
 
-def test_what_the_system_takes_back_meanwhile_hides_no_growth(part, tmp_path):
-    library = tmp_path / "library"
+def of_a_library(folder):
+    """200 MiB of a file, as libraries are."""
+    library = folder / "library"
     library.write_bytes(bytes(200 << 20))
-    with library.open("rb") as file, mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) as pages:
+    with library.open("rb") as file:
+        return mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
+
+
+def of_its_own(_):
+    """200 MiB of its own, such as an allocator keeps and tells the system that it may have."""
+    pages = mmap.mmap(-1, 200 << 20, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    pages.write(b"a" * len(pages))
+    return pages
+
+
+@pytest.mark.parametrize("mapped", [of_a_library, of_its_own])
+def test_what_the_system_takes_back_meanwhile_hides_no_growth(part, tmp_path, mapped):
+    with mapped(tmp_path) as pages:
         read = broken("bloats")
 
         def taken_back(folder):
