@@ -2,7 +2,8 @@
 
 import asyncio
 import contextlib
-import json
+import sys
+from itertools import product
 
 import pytest
 from fastapi import FastAPI, Request
@@ -189,17 +190,30 @@ async def test_an_answer_of_brackets_alone_is_a_text(depth):
         assert isinstance(body, str) == (depth > MOST_DEPTH)
 
 
-async def test_what_is_nested_deep_is_no_failure_of_the_talk():
-    deep = json.loads("[" * 900 + "]" * 900)
-    for _ in range(200):
-        deep = [deep]
-    async with house() as (rooms, call):
-        brackets = "[" * 8_000 + "]" * 8_000
-        assert await call("/deep?depth=8000") == {"status": 200, "body": brackets}
-        for method in ("GET", "POST"):
-            told = await call("/echo/", {"a": deep}, method)
-            assert told == {"error": "t failed: its arguments are nested too deep."}
-    assert not rooms.seen
+def nested(depth):
+    """A list in a list, and so on."""
+    value = []
+    for _ in range(depth - 1):
+        value = [value]
+    return value
+
+
+@pytest.mark.parametrize("limit", [1000, 3000])
+async def test_what_is_nested_deep_is_no_failure_of_the_talk(limit):
+    # PyTorch's compiler raises the interpreter's limit for good, to 2,000.
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, before))
+    try:
+        async with house() as (rooms, call):
+            brackets = "[" * 8_000 + "]" * 8_000
+            assert await call("/deep?depth=8000") == {"status": 200, "body": brackets}
+            for depth, method in product((MOST_DEPTH, 1_100, 100_000), ("GET", "POST")):
+                told = await call("/echo/", {"a": nested(depth)}, method)
+                assert told == {"error": "t failed: its arguments are nested too deep."}
+            assert not rooms.seen
+            assert "body" in await call("/echo/", {"a": nested(MOST_DEPTH - 1)}, "POST")
+    finally:
+        sys.setrecursionlimit(before)
 
 
 async def test_arguments_that_do_not_fit_are_not_sent():

@@ -30,7 +30,7 @@ from ico3d.errors import SettingsError
 
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
 TOO_LONG = f"its answer has more than {MOST_BYTES} bytes"
-MOST_DEPTH = 100  # of an answer as JSON: what sends it on has less room than what parses it
+MOST_DEPTH = 100  # of arguments and answers: the interpreter's own limit changes as it runs
 MOST_RECEIVED = 4 * MOST_BYTES  # of a connection: heads of answers, which may be many, count, too
 MOST_REDIRECTS = 3
 REDIRECTS = (301, 302, 303, 307, 308)
@@ -140,8 +140,6 @@ async def answer(
         return {"error": f"{tool.name} did not answer within {tool.seconds:g} seconds."}
     except aiohttp.ClientConnectorError as error:
         return {"error": f"{tool.name} cannot be reached: {error.os_error}."}
-    except RecursionError:
-        return {"error": f"{tool.name} failed: its arguments are nested too deep."}
     except (Refused, SettingsError, aiohttp.ClientError, ValueError) as error:
         said = str(error).rstrip(".") or type(error).__name__
         return {"error": f"{tool.name} failed: {said}."}
@@ -153,6 +151,8 @@ def _request(tool: Tool, arguments: Mapping[str, Any]) -> tuple[str, dict[str, A
     missing = [name for name in tool.required if name not in arguments]
     if unknown or missing:
         raise Refused(f"it takes {list(tool.properties)} and needs {tool.required}")
+    if _levels(arguments) > MOST_DEPTH:
+        raise Refused("its arguments are nested too deep")
     headers = {"headers": filled_in(tool.headers, tool.where)}
     inside = {name: _quoted(arguments[name]) for name in tool.placeholders}
     url = tool.url.format_map(inside)
@@ -160,6 +160,15 @@ def _request(tool: Tool, arguments: Mapping[str, Any]) -> tuple[str, dict[str, A
     if tool.method == "POST":
         return url, {"json": rest, **headers}
     return url, {"params": {name: _text(value) for name, value in rest.items()}, **headers}
+
+
+def _levels(value: Any) -> int:
+    """How deep lists and objects are nested in a value of JSON; counted up to one too many."""
+    inside, levels = [value], 0
+    while levels <= MOST_DEPTH and (inside := [v for v in inside if isinstance(v, (list, dict))]):
+        levels += 1
+        inside = [x for v in inside for x in (v.values() if isinstance(v, dict) else v)]
+    return levels
 
 
 def _quoted(value: Any) -> str:
