@@ -3,11 +3,11 @@
     ICO3D_MODELS=MODELS python bench/portraits/webcam.py --work WORK [--seeds 3] [--json F]
 
 Synthetic people talk before one camera. What a webcam with a fault makes of it, an H.264 film, goes
-the way of `ico3d create --quality quick`: MediaPipe tracks it, a head learns from it. The head is
-then drawn in the film's last eleventh, which it never saw, and compared with the clean pictures of
-the same moments on the true face (within jaw and brows) and head (with hair). What WORK holds
-already is not made again; a case of an earlier version of the code is made again once its folder is
-removed.
+the way of `ico3d create`: MediaPipe tracks it, a head learns from it. The head is then drawn in the
+film's last eleventh, which it never saw, and compared with the clean pictures of the same moments
+on the true face (within jaw and brows) and head (with hair). What WORK holds already is not made
+again; a case of an earlier version of the code, or of other options, is made again once its folder
+is removed.
 """
 
 import json
@@ -25,7 +25,7 @@ from ico3d.capture.portrait.settings import PortraitSettings
 from ico3d.capture.portrait.track import track_portrait
 from ico3d.cli import run_script
 from ico3d.common.psnr import psnr
-from ico3d.creating.settings import QUALITIES
+from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import Initial
 from ico3d.head.train_head import HeadJob, train_head
@@ -37,9 +37,6 @@ from ico3d.studio.recording import Recording, record
 from ico3d.studio.webcam.faults import FAULTS, FaultName
 from ico3d.studio.webcam.film import webcam_of, write_film
 
-QUICK = QUALITIES["quick"]
-FIRST, MOST = 4_000, 6_000
-"""Gaussians that a training begins with, and has at most: half of what a head usually has."""
 PEOPLE_FPS = 12.5
 """Pictures per second of films that compare people: half as many to draw."""
 WORKERS = 2
@@ -83,7 +80,9 @@ class Webcam:
         only: Names of cases; all by default.
         seconds: Length of each film.
         size: Height and width of the pictures.
-        steps: Steps of each training.
+        quality: How `ico3d create` would track and train.
+        steps: Steps of each training, instead of that quality's.
+        gaussians: Most Gaussians of a head; a training begins with two thirds of them.
         json: Where to write the figures.
     """
 
@@ -92,7 +91,9 @@ class Webcam:
     only: tuple[str, ...] = ()
     seconds: float = 20.0
     size: int = 320
+    quality: QualityName = "quick"
     steps: int = 250
+    gaussians: int = 6_000
     json: Path | None = None
 
     def run(self) -> None:
@@ -136,16 +137,20 @@ class Webcam:
     ) -> tuple[TrainedHead, Capture]:
         """The head that is learnt from a case's film, and the tracked film."""
         film, tracked = folder / "film.mp4", folder / "capture"
+        quality = QUALITIES[self.quality]
         if not film.is_file():
             of = (truth.num_frames, truth.fps, truth.audio(), case.faults, seed)
             write_film(film, lambda frame: _picture(truth, frame), *of)
         if not tracked.exists():
-            track_portrait(film, tracked, PortraitSettings(refine=False, most=QUICK.pictures))
+            track_portrait(
+                film, tracked, PortraitSettings(refine=quality.refine, most=quality.pictures)
+            )
         capture = open_capture(tracked)
-        density = replace(QUICK.head.density, until=2 * self.steps // 3, max_gaussians=MOST)
-        settings = replace(
-            QUICK.head, steps=self.steps, density=density, initial=Initial(gaussians=FIRST)
+        density = replace(
+            quality.head.density, until=2 * self.steps // 3, max_gaussians=self.gaussians
         )
+        initial = Initial(gaussians=2 * self.gaussians // 3)
+        settings = replace(quality.head, steps=self.steps, density=density, initial=initial)
         job = HeadJob("speech", "full", "builtin", seed, settings)
         return train_head(capture, folder / "head", job, device="cpu"), capture
 

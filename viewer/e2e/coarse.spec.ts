@@ -1,8 +1,9 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
-import { drawnBy } from '../support/browser/path.ts';
-import { psnr, takePixels } from '../support/browser/pictures.ts';
+import { stillPerson } from '../support/browser/drawing.ts';
+import { drawnBy, withoutWebGL } from '../support/browser/path.ts';
+import { lookAsBundled, psnr, shownPixels, takePixels } from '../support/browser/pictures.ts';
 import { makePerson } from '../support/references/person.ts';
 import { servePage } from '../support/servers/static.ts';
 
@@ -21,10 +22,7 @@ beforeAll(async () => {
   browser = await Browser.launch({ width: 120, height: 160, calm: true });
   page = browser.page;
   const held = new Promise<void>((resolve) => (release = resolve));
-  await page.route('**/*_rest.safetensors*', async (route) => {
-    await held;
-    await route.continue();
-  });
+  await holdRest(page, held);
   await browser.open(drawnBy('webgl', site.url));
   await page.evaluate(() => window.ico3d!.stage.still());
 });
@@ -33,6 +31,14 @@ afterAll(async () => {
   await browser?.close();
   site?.close();
 });
+
+/** Lets a page have the first Gaussians only until a promise is kept. */
+async function holdRest(page: Page, held: Promise<void>): Promise<void> {
+  await page.route('**/*_rest.safetensors*', async (route) => {
+    await held;
+    await route.continue();
+  });
+}
 
 /** Gaussians of head and body that the picture shows, and what it looks like. */
 async function look(): Promise<{ drawn: number[]; pixels: Buffer | Uint8Array }> {
@@ -45,6 +51,21 @@ async function look(): Promise<{ drawn: number[]; pixels: Buffer | Uint8Array }>
 }
 
 describe('a person whose Gaussians come in two files', () => {
+  test('is the same with WebGL and without it while the first ones stand alone', async () => {
+    const other = await Browser.launch({ width: 120, height: 160, calm: true });
+    await withoutWebGL(other.context);
+    await holdRest(other.page, new Promise(() => {}));
+    await other.open(drawnBy('soft', site.url));
+    for (const one of [page, other.page]) {
+      await lookAsBundled(one, folder);
+      await stillPerson(one, 0);
+    }
+    const likeness = psnr(await shownPixels(other.page), await takePixels(page));
+    console.log(`${likeness.toFixed(1)} dB`);
+    expect(likeness).toBeGreaterThan(40);
+    await other.close();
+  });
+
   test('is seen from the first ones, and becomes finer without a jump when the others come', async () => {
     const coarse = await look();
     for (const count of coarse.drawn) {

@@ -5,7 +5,7 @@ import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
 import { stillPerson } from '../../support/browser/drawing.ts';
 import { drawnBy, withoutWebGL } from '../../support/browser/path.ts';
-import { lookAsBundled, psnr, takePixels } from '../../support/browser/pictures.ts';
+import { lookAsBundled, psnr, shownPixels, takePixels } from '../../support/browser/pictures.ts';
 import { REPOSITORY } from '../../support/python.ts';
 import { makePerson } from '../../support/references/person.ts';
 import { servePage } from '../../support/servers/static.ts';
@@ -20,16 +20,6 @@ const person = makePerson({ gaussians: '300,450', times: TIMES, pictures: `${WID
 /** The scripts that a page has loaded. */
 function scripts(page: Page): Promise<string[]> {
   return page.evaluate(() => performance.getEntriesByType('resource').map(({ name }) => name.split('/').at(-1)!).filter((name) => name.endsWith('.js')));
-}
-
-/** What the canvas shows: (H, W, 3). */
-async function shownPixels(page: Page): Promise<Uint8Array> {
-  const encoded = await page.evaluate(() => {
-    const canvas = document.querySelector<HTMLCanvasElement>('#stage')!;
-    const { data } = canvas.getContext('2d')!.getImageData(0, 0, canvas.width, canvas.height);
-    return btoa(data.reduce((text, value) => text + String.fromCharCode(value), ''));
-  });
-  return new Uint8Array(Buffer.from(encoded, 'base64')).filter((_, at) => at % 4 < 3);
 }
 
 /** Goes on to a moment, with another face, over what is shown; Spark sorts before. */

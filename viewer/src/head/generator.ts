@@ -1,11 +1,11 @@
 import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
-import { Generator } from '../gaussians/generator.ts';
+import { GrowingGenerator } from '../gaussians/growing.ts';
 import { coefficients } from './coefficients.ts';
 import { MOTION_SIZE, STILL } from './shoulders.ts';
 import { SoftHead, type ShownRows } from './soft.ts';
 
 /** The head as a generator: Gaussians from a baked basis and K coefficients. */
-export class HeadGenerator extends Generator {
+export class HeadGenerator extends GrowingGenerator {
   /** The first Gaussians, and those that came later. */
   readonly parts: ShownRows[];
   /** Coefficients of the expression shown (K,), and the motion of the shoulders (7,). */
@@ -13,8 +13,6 @@ export class HeadGenerator extends Generator {
   readonly shown: Float32Array;
   /** How the shoulders have moved against the head: rotation wxyz, shift. */
   readonly bent: Float32Array;
-  /** Share of their opacity that Gaussians have which came later. */
-  grown = 0;
   readonly soft: SoftHead;
   private readonly network: BakedHead['network'];
   private readonly share: Uint8Array;
@@ -24,7 +22,7 @@ export class HeadGenerator extends Generator {
    * @param share (capacity,) how much each moves with the shoulders, of 255
    */
   constructor(head: BakedHead, capacity = head.count, share: Uint8Array = new Uint8Array(capacity)) {
-    super(capacity);
+    super(capacity, head.count);
     this.share = share;
     this.parts = [{ ...head, share: share.subarray(0, head.count) }];
     this.values = new Float32Array(head.rank + MOTION_SIZE);
@@ -39,12 +37,6 @@ export class HeadGenerator extends Generator {
   complete(rest: HeadRows): void {
     const first = this.parts[0]!.count;
     this.parts.push({ ...rest, share: this.share.subarray(first, first + rest.count) });
-    this.changed();
-  }
-
-  /** Shows the Gaussians that came later with a share of their opacity. */
-  grow(share: number): void {
-    this.grown = share;
     this.changed();
   }
 

@@ -12,6 +12,7 @@ export interface HeadNow {
   readonly parts: readonly ShownRows[];
   readonly values: Float32Array; // (K,) coefficients, (7,) motion of the shoulders
   readonly grown: number; // share of what came after the first part that is seen
+  readonly wide: number; // by which sizes of the first part are multiplied
 }
 
 /** A head for the processor's path. */
@@ -33,7 +34,7 @@ export class SoftHead implements SoftObject {
   }
 
   get late(): Late {
-    return this.packed.late(this.head.grown);
+    return this.packed.late(this.head.grown, this.head.wide);
   }
 
   get values(): Float32Array {

@@ -17,10 +17,12 @@ export class SparkHead extends SparkTwin {
     const { rank, count } = first!;
     const texels = makeTexels(head.numSplats, rank);
     const grown = { value: head.grown };
+    const wide = { value: head.wide };
     let filled = 0; // parts
     let gaussians = 0;
     const follow = () => {
       grown.value = head.grown;
+      wide.value = head.wide;
       for (const part of head.parts.slice(filled)) {
         fill(texels, part, gaussians);
         gaussians += part.count;
@@ -33,6 +35,7 @@ export class SparkHead extends SparkTwin {
       headCoefficients: { value: head.shown },
       headFirst: { value: count },
       headGrown: grown,
+      headWide: wide,
       headBend: { value: head.bent },
     };
     super(head, { declarations: declarations(rank), uniforms, statements: (index, gsplat) => statements(rank, index, gsplat) }, follow);
@@ -46,6 +49,7 @@ function declarations(rank: number): string {
     uniform float headCoefficients[${rank}];
     uniform int headFirst;
     uniform float headGrown;
+    uniform float headWide;
     uniform float headBend[${MOTION_SIZE}];
     vec4 headTurned(vec4 a, vec4 b) {
       return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
@@ -80,7 +84,7 @@ function statements(rank: number, index: string, gsplat: string): string[] {
       ${gsplat}.center = centreAndScale.xyz;
       ${gsplat}.quaternion = texelFetch(headRest, ivec3(texel, 1), 0);
       vec4 scalesAndShare = texelFetch(headRest, ivec3(texel, 2), 0);
-      ${gsplat}.scales = scalesAndShare.xyz;
+      ${gsplat}.scales = scalesAndShare.xyz * (${index} < headFirst ? headWide : 1.0);
       if (scalesAndShare.w > 0.0) {
         vec4 bend = vec4(headBend[1], headBend[2], headBend[3], headBend[0]);
         vec3 across = cross(bend.xyz, ${gsplat}.center) + bend.w * ${gsplat}.center;

@@ -6,7 +6,7 @@ export interface Kernel {
   reserve(bytes: number): number;
   layOut(gaussians: number, pairs: number, tiles: number): void;
   begin(fx: number, fy: number, cx: number, cy: number, width: number, height: number, first: number, end: number): void;
-  fade(first: number, share: number): void;
+  fade(first: number, share: number, wide: number): void;
   addStill(view: number, rows: number, count: number): void;
   addHead(view: number, rows: number, count: number, values: number, rank: number): void;
   addWindow(view: number, rows: number, count: number, values: number, positions: number, rotations: number, scales: number, row: number): void;

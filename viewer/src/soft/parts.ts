@@ -23,9 +23,9 @@ export class PackedParts<Part extends { count: number }> {
     return share > 0 ? this.count : this.parts[0]!.count;
   }
 
-  /** What came after the first part, seen by a share. */
-  late(share: number): Late {
-    return { first: this.parts[0]!.count, share };
+  /** What came after the first part, seen by a share, while sizes of the first are multiplied. */
+  late(share: number, wide: number): Late {
+    return { first: this.parts[0]!.count, share, wide };
   }
 
   private get count(): number {

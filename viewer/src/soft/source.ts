@@ -27,10 +27,11 @@ export type Kind = 'still' | 'head' | 'window' | 'skinned';
 /** Bytes of a row before basis vectors or shapes. */
 export const ROW_BYTES: Record<Kind, number> = { still: 64, head: 64, window: 64, skinned: 96 };
 
-/** Gaussians of a head or a skinned body that appear: those from a number on have a share of their opacity. */
+/** Gaussians of a head or a skinned body that appear: those from a number on have a share of their opacity, those before are wider. */
 export interface Late {
   first: number;
   share: number;
+  wide: number;
 }
 
 /** Something on stage that has Gaussians; it moves as its object does. */

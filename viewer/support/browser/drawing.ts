@@ -65,10 +65,10 @@ export function refreshed(page: Page): Promise<unknown> {
 /** Draws a person whose face is at rest at a time of the recording, well sorted. */
 export async function stillPerson(page: Page, time: number): Promise<void> {
   await page.evaluate(async (seconds) => {
-    const { stage, body, head } = window.ico3d!;
+    const { stage, body, skinned, head } = window.ico3d!;
     head!.director = null;
     stage.start();
-    await body!.show(seconds);
+    await (body ?? skinned)!.show(seconds);
     head!.express(new Float32Array(head!.expression.length));
     await stage.still();
   }, time);

@@ -50,6 +50,16 @@ export async function takePixels(page: Page): Promise<Uint8Array> {
   return pixels;
 }
 
+/** What the canvas shows of a page that draws without WebGL: (H, W, 3). */
+export async function shownPixels(page: Page): Promise<Uint8Array> {
+  const encoded = await page.evaluate(() => {
+    const canvas = document.querySelector<HTMLCanvasElement>('#stage')!;
+    const { data } = canvas.getContext('2d')!.getImageData(0, 0, canvas.width, canvas.height);
+    return btoa(data.reduce((text, value) => text + String.fromCharCode(value), ''));
+  });
+  return new Uint8Array(Buffer.from(encoded, 'base64')).filter((_, at) => at % 4 < 3);
+}
+
 /** Peak signal-to-noise ratio of two 8-bit pictures, dB. */
 export function psnr(a: Uint8Array, b: Uint8Array): number {
   if (a.length !== b.length) throw new Error(`pictures of ${a.length} and ${b.length} bytes`);

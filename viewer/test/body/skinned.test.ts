@@ -76,7 +76,7 @@ describe('a body on a skeleton that Python baked', () => {
     }
   });
 
-  test('without WebGL, Gaussians that come later appear by their opacity', async () => {
+  test('without WebGL, Gaussians that come later appear by their opacity, and the first ones are wider until then', async () => {
     const body = new SkinnedGenerator(baked);
     const { soft } = body;
     const { source } = soft;
@@ -87,16 +87,19 @@ describe('a body on a skeleton that Python baked', () => {
     const fainter = new Float32Array(source!.rows.slice(0));
     const stride = fainter.length / source!.count;
     for (let i = first; i < source!.count; i++) fainter[stride * i + 13]! *= 0.5;
-    const draw = async (rows: ArrayBuffer, share: number) => {
+    const wider = fainter.slice();
+    for (let i = 0; i < first; i++) for (let k = 7; k < 10; k++) wider[stride * i + k]! *= 1.5;
+    const draw = async (rows: ArrayBuffer, share: number, wide = 1) => {
       const rasteriser = new Rasteriser(await makeKernel());
       rasteriser.put(0, { ...source!, rows });
-      const placed = [{ id: 0, view, drawn: source!.count, values: soft.values, late: { first, share } }];
+      const placed = [{ id: 0, view, drawn: source!.count, values: soft.values, late: { first, share, wide } }];
       return rasteriser.draw({ lens, width: WIDTH, height: HEIGHT, band: [0, WIDTH / TILE_WIDTH], placed }, clothOf([0.5, 0.5, 0.5], WIDTH, HEIGHT)).slice();
     };
     const half = await draw(source!.rows, 0.5);
     expect(worst(half, await draw(fainter.buffer, 1))).toBe(0);
     expect(worst(half, await draw(source!.rows, 1))).toBeGreaterThan(10);
-    expect(soft.late).toEqual({ first: source!.count, share: 0 }); // of one file, all are the first
+    expect(worst(await draw(source!.rows, 0.5, 1.5), await draw(wider.buffer, 1))).toBe(0);
+    expect(soft.late).toEqual({ first: source!.count, share: 0, wide: 1 }); // of one file, all are the first
   });
 
   test('its texels hold what the file holds', () => {

@@ -101,7 +101,7 @@ describe('the rasteriser', () => {
           for (const high of sizes) {
             new Float32Array(kernel.memory.buffer, at, 16).set([x, y, 1, 1, 0, 0, 0.3, wide, high, 1, 0.5, 0.4, 0.3, 0.9, 0, 0]);
             kernel.begin(100, 100, 100, 75, WIDTH, HEIGHT, 0, COLUMNS);
-            kernel.fade(1, 1);
+            kernel.fade(1, 1, 1);
             kernel.addStill(view, at, 1);
             seen += kernel.seen();
             expect(kernel.bin(1), `${x}, ${y}, ${wide}, ${high}`).toBe(1);
@@ -139,17 +139,17 @@ describe('the rasteriser', () => {
     expect(keeping.drawnTiles).toBe(tiles - 3);
   });
 
-  test('lets the Gaussians of a head that came later appear by their opacity', async () => {
+  test('lets the Gaussians of a head that came later appear by their opacity, and the first ones be wider', async () => {
     const light = [50, 50, 50, 0]; // logits: white, half opaque
     const head = [-0.5, 0.5].flatMap((aside) => [aside, 0, 2, 1, 0, 0, 0, 0.1, 0.1, 0.1, 0, ...light, 0]);
     const one = new Rasteriser(await makeKernel());
     one.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head).buffer, sizes: [0] });
     const black = clothOf([0, 0, 0], WIDTH, HEIGHT);
     const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
-    const shine = (share: number) => {
-      const placed = [{ id: 0, view, drawn: 2, values: new Float32Array(0), late: { first: 1, share } }];
-      const picture = one.draw({ lens: [100, 100, 100, 75], width: WIDTH, height: HEIGHT, band: [0, COLUMNS], placed }, black);
-      return [75, 125].map((x) => picture[4 * (75 * TILE_WIDTH * COLUMNS + x)]!);
+    const shine = (share: number, wide = 1, from = one, aside = 0) => {
+      const placed = [{ id: 0, view, drawn: 2, values: new Float32Array(0), late: { first: 1, share, wide } }];
+      const picture = from.draw({ lens: [100, 100, 100, 75], width: WIDTH, height: HEIGHT, band: [0, COLUMNS], placed }, black);
+      return [75 + aside, 125 + aside].map((x) => picture[4 * (75 * TILE_WIDTH * COLUMNS + x)]!);
     };
     const [first, second] = shine(1);
     expect(first).toBeGreaterThan(100);
@@ -159,6 +159,11 @@ describe('the rasteriser', () => {
       expect(before).toBe(first);
       expect(Math.abs(after! - share * first!)).toBeLessThanOrEqual(1);
     }
+    const wider = new Rasteriser(await makeKernel());
+    wider.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head, (value, i) => ([7, 8, 9].includes(i) ? 2 * value : value)).buffer, sizes: [0] });
+    const aside = 8; // pixels
+    expect(shine(0.5, 2, one, aside)).toEqual(shine(0.5, 1, wider, aside));
+    expect(shine(0.5, 2, one, aside)).not.toEqual(shine(0.5, 1, one, aside));
   });
 
   test('moves the Gaussians of a head by their share of the motion of the shoulders', async () => {

@@ -1,11 +1,11 @@
-import { Generator } from '../../gaussians/generator.ts';
+import { GrowingGenerator } from '../../gaussians/growing.ts';
 import type { BakedSkinned, SkinnedRows } from './baked.ts';
 import { ShadowMap } from './shadow.ts';
 import { placesOf, Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
 import { SoftSkinned } from './soft.ts';
 
 /** A body on a skeleton as a generator: its Gaussians move, turn and are coloured with their joints. */
-export class SkinnedGenerator extends Generator {
+export class SkinnedGenerator extends GrowingGenerator {
   readonly baked: BakedSkinned;
   readonly skeleton: Skeleton;
   /** The first Gaussians, and those that came later. */
@@ -18,13 +18,11 @@ export class SkinnedGenerator extends Generator {
   readonly map: ShadowMap | null;
   /** Gaussians that are drawn at most. */
   most: number;
-  /** Share of their opacity that Gaussians have which came later. */
-  grown = 0;
   readonly soft: SoftSkinned;
 
   constructor(baked: BakedSkinned) {
     const { info, lamp } = baked;
-    super(info.num_gaussians);
+    super(info.num_gaussians, baked.count);
     this.baked = baked;
     this.parts = [baked];
     this.most = info.num_gaussians;
@@ -50,12 +48,6 @@ export class SkinnedGenerator extends Generator {
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
   complete(rest: SkinnedRows): void {
     this.parts.push(rest);
-    this.changed();
-  }
-
-  /** Shows the Gaussians that came later with a share of their opacity. */
-  grow(share: number): void {
-    this.grown = share;
     this.changed();
   }
 

@@ -19,6 +19,7 @@ export interface SkinnedNow {
   readonly map: ShadowMap | null;
   readonly most: number; // Gaussians that are drawn
   readonly grown: number; // share of what came after the first part that is seen
+  readonly wide: number; // by which sizes of the first part are multiplied
 }
 
 /** A body on a skeleton for the processor's path. */
@@ -48,7 +49,7 @@ export class SoftSkinned implements SoftObject {
   }
 
   get late(): Late {
-    return this.packed.late(this.body.grown);
+    return this.packed.late(this.body.grown, this.body.wide);
   }
 
   get values(): Float32Array {

@@ -32,6 +32,7 @@ export class SparkSkinned extends SparkTwin {
       if (shadow) shadow.texture.needsUpdate = true;
       body.residual.forEach((value, k) => uniforms.skinnedResidual.value[k >> 2]!.setComponent(k & 3, value));
       uniforms.skinnedGrown.value = body.grown;
+      uniforms.skinnedWide.value = body.wide;
       uniforms.skinnedCount.value = body.most;
     };
     const declarations = lamp ? DECLARATIONS + dyno.unindent(SHADOW_DECLARATIONS) : DECLARATIONS;
@@ -49,6 +50,7 @@ interface Uniforms {
   skinnedCount: { value: number }; // Gaussians that are drawn
   skinnedFirst: { value: number }; // Gaussians that came first
   skinnedGrown: { value: number }; // share of their opacity that the others have
+  skinnedWide: { value: number }; // by which sizes of the first ones are multiplied
 }
 
 function makeUniforms({ baked: { info, count, light }, table }: SkinnedGenerator, { width, rows, layers, words }: Texels): Uniforms {
@@ -67,6 +69,7 @@ function makeUniforms({ baked: { info, count, light }, table }: SkinnedGenerator
     skinnedCount: { value: info.num_gaussians },
     skinnedFirst: { value: count },
     skinnedGrown: { value: 0 },
+    skinnedWide: { value: 1 },
   };
 }
 
@@ -92,6 +95,7 @@ const DECLARATIONS = dyno.unindent(`
   uniform int skinnedCount;
   uniform int skinnedFirst;
   uniform float skinnedGrown;
+  uniform float skinnedWide;
 
   vec4 skinnedBytes(uint word) {
     return vec4(ivec4(uvec4(word) << uvec4(24u, 16u, 8u, 0u)) >> 24);
@@ -165,7 +169,7 @@ function statements({ width }: Texels, shapes: number, lit: string, index: strin
       ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
       ${gsplat}.center = centre;
       ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
-      ${gsplat}.scales = exp(vec3(unpackHalf2x16(c.x), between.x));
+      ${gsplat}.scales = exp(vec3(unpackHalf2x16(c.x), between.x)) * (${index} < skinnedFirst ? skinnedWide : 1.0);
       ${gsplat}.rgba = vec4(1.0 / (1.0 + exp(-logits)), grown * float(b.w >> 24u) / 255.0);
     }
   `);

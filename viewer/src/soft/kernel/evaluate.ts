@@ -16,14 +16,19 @@ const LEAST_SCALE: f32 = 1e-6; // m
 const TABLE_ROW: usize = 64; // bytes of a joint: (3,4) matrix, quaternion wxyz
 const LOG2_E: f32 = 1.4426950408889634;
 
-// From this Gaussian of a source on, opacities are multiplied by a share.
+// From this Gaussian of a source on, opacities are multiplied by a share; before it, sizes by a factor.
 let late: i32 = 0;
 let lateShare: f32 = 1;
+let firstWide: f32 = 1;
 
-/** Lets the Gaussians of the next source appear from number `first` on, with a share of their opacity. */
-export function fade(first: i32, share: f32): void {
+/**
+ * Lets the Gaussians of the next source, a head or a skinned body, appear from number `first` on with
+ * a share of their opacity; those before are wider by a factor.
+ */
+export function fade(first: i32, share: f32, wide: f32): void {
   late = first;
   lateShare = share;
+  firstWide = wide;
 }
 
 /** What stands still: centre, rotation, scales, colour and opacity. */
@@ -100,9 +105,10 @@ export function addHead(view: usize, rows: usize, count: i32, values: usize, ran
   const end = rows + stride * <usize>count;
   const fading = rows + stride * <usize>min(late, count);
   for (let at = rows; at < end; at += stride) {
-    const s0 = load<f32>(at, 28);
-    const s1 = load<f32>(at, 32);
-    const s2 = load<f32>(at, 36);
+    const wide = at < fading ? firstWide : ONE;
+    const s0 = wide * load<f32>(at, 28);
+    const s1 = wide * load<f32>(at, 32);
+    const s2 = wide * load<f32>(at, 36);
     const share = load<f32>(at, 60);
     if (share > 0) bend(at, motion, share);
     else take(at);
@@ -196,9 +202,10 @@ export function addSkinned(view: usize, rows: usize, count: i32, values: usize, 
     const cx = sum(f32x4.mul(x, rest));
     const cy = sum(f32x4.mul(y, rest));
     const cz = sum(f32x4.mul(z, rest));
-    const s0 = load<f32>(at, 28);
-    const s1 = load<f32>(at, 32);
-    const s2 = load<f32>(at, 36);
+    const wide = at < fading ? firstWide : ONE;
+    const s0 = wide * load<f32>(at, 28);
+    const s1 = wide * load<f32>(at, 32);
+    const s2 = wide * load<f32>(at, 36);
     if (!approach(view, cx, cy, cz, max(s0, max(s1, s2)))) continue;
     const record = splatTurned(view, product(turn, v128.load(at, 12)), s0, s1, s2, load<f32>(at, 52) * (at < fading ? ONE : lateShare));
     if (!record) continue;
