@@ -13,6 +13,7 @@ from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.frames import PhonemesFrame
 from ico3d.chat.pipecat_internals import mark_synchronous
+from ico3d.chat.services.voice.portions import portions
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.espeak import Phoneme
 from ico3d.errors import MissingExtraError
@@ -75,15 +76,16 @@ class PieceVoice(Prompt):
         self._speak = speak
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields the speech sounds of a text and its sound in one frame, or an error."""
-        try:
-            spoken = await asyncio.to_thread(self._speak, text)
-        except Exception as error:
-            yield ErrorFrame(f"a sentence could not be spoken: {error}", exception=error)
-            return
-        if spoken.phonemes:
-            yield PhonemesFrame(spoken.phonemes, len(spoken.pcm) / SPEECH_RATE, context_id)
-        yield TTSAudioRawFrame(spoken.pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
+        """Yields the speech sounds of each portion of a text and its sound, or an error."""
+        for portion in portions(text):
+            try:
+                spoken = await asyncio.to_thread(self._speak, portion)
+            except Exception as error:
+                yield ErrorFrame(f"a sentence could not be spoken: {error}", exception=error)
+                return
+            if spoken.phonemes:
+                yield PhonemesFrame(spoken.phonemes, len(spoken.pcm) / SPEECH_RATE, context_id)
+            yield TTSAudioRawFrame(spoken.pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
 
 
 def at_speech_rate(samples: np.ndarray, rate: int) -> np.ndarray:
