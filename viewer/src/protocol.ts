@@ -7,6 +7,8 @@ export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second
 export const RESUME_SECONDS = 30;
 export const BEAT_SECONDS = 1;
+export const MAX_TEXT_FRAME = 16384; // bytes
+export const MAX_BINARY_FRAME = 65536; // bytes
 
 /** A matrix in row order. */
 export interface Matrix {

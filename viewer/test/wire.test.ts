@@ -2,7 +2,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
 import { floatFromHalf } from '../src/half.ts';
-import type { SpeechMessage } from '../src/protocol.ts';
+import { MAX_TEXT_FRAME, type SpeechMessage } from '../src/protocol.ts';
 import { decode, encode } from '../src/talk/wire.ts';
 import { runPython } from '../support/python.ts';
 import { arrayBuffer } from '../support/references/head.ts';
@@ -72,4 +72,39 @@ test.each([
 
 test('a message of no known type is refused', () => {
   expect(() => decode('{"type": "hello"}')).toThrow(/unknown message hello/);
+});
+
+/** A frame of speech with sizes that may not be those of its sound (2,) and expressions (1, 3). */
+function speechFrame(pcm: unknown, expressions: unknown, padding = 0): ArrayBuffer {
+  const header = new TextEncoder().encode(JSON.stringify({ type: 'speech', utterance: 1, index: 0, first_sample: 0, first_expression: 0, pcm, expressions }));
+  const frame = new Uint8Array(4 + header.length + 2 * 2 + 2 * 3 + padding);
+  new DataView(frame.buffer).setUint32(0, header.length, true);
+  frame.set(header, 4);
+  return frame.buffer;
+}
+
+test('a frame of speech must hold what its sizes say', () => {
+  expect((decode(speechFrame([2], [1, 3])) as SpeechMessage).expressions).toMatchObject({ rows: 1, columns: 3 });
+  expect((decode(speechFrame([5], [70, 0])) as SpeechMessage).expressions).toMatchObject({ rows: 70, columns: 0 });
+  const odd: [unknown, unknown, number?][] = [
+    [[2], [200_000_000, 53]],
+    [[5], [200_000_000, 0]],
+    [[2], [1, 2]],
+    [[2], [1, 3], 2],
+    [[2], [3]],
+    [[2, 1], [1, 3]],
+    [[-2], [1, 7]],
+    [[0.5], [1, 3]],
+    [null, [1, 3]],
+    [[2], '13'],
+    [[2], { length: 2, 0: 1, 1: 3 }],
+    [[2], ['1', 3]],
+  ];
+  for (const [pcm, expressions, padding] of odd) {
+    expect(() => decode(speechFrame(pcm, expressions, padding)), JSON.stringify([pcm, expressions])).toThrow(/odd shape|bytes instead of/);
+  }
+});
+
+test('a message that is longer than any may be is not even parsed', () => {
+  expect(() => decode(`{"type": "state", "state": "${'a'.repeat(MAX_TEXT_FRAME)}"}`)).toThrow(/more than 16384 bytes/);
 });

@@ -128,8 +128,8 @@ function heardBy({ words, text }: Sentence, seconds: number): number {
 
 /** The server counts code points, texts of a browser UTF-16 units. */
 function timed(text: string, { starts, times }: SpokenMessage): Word[] {
-  const points = Array.from(text);
-  const units = points.reduce((sums, point) => [...sums, sums.at(-1)! + point.length], [0]);
+  const units = [0];
+  for (const point of text) units.push(units.at(-1)! + point.length);
   return starts.map((start, i) => ({ start: units[start] ?? text.length, time: times[i]! }));
 }
 

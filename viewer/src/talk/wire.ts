@@ -1,5 +1,5 @@
 import { floatFromHalf } from '../half.ts';
-import { SERVER_TYPES, TENSORS, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
+import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, SERVER_TYPES, TENSORS, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
 
 /** What is done with each of some messages: the compiler misses none. */
 export type Handlers<M extends ServerMessage> = {
@@ -42,18 +42,30 @@ function joinFrame(header: Uint8Array, parts: Int16Array[]): ArrayBuffer {
 
 /** A frame as a message; throws an Error on one that is not from this protocol. */
 export function decode(frame: string | ArrayBuffer): ServerMessage {
-  if (typeof frame === 'string') return known(JSON.parse(frame) as Header);
+  if (typeof frame === 'string') return known(parse(frame, MAX_TEXT_FRAME));
   const length = new DataView(frame).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length))) as Header;
+  const header = parse(new TextDecoder().decode(new Uint8Array(frame, 4, length)), MAX_BINARY_FRAME);
   let at = 4 + length;
   for (const [field, kind] of TENSORS[header.type] ?? []) {
-    const shape = header[field] as number[];
-    const bytes = 2 * shape.reduce((product, size) => product * size, 1);
-    const words = new Uint16Array(frame.slice(at, at + bytes));
+    const shape = header[field];
+    if (!isShape(shape, kind === 'int16' ? 1 : 2)) throw new Error(`${header.type}: ${field} has an odd shape`);
+    const end = at + 2 * shape.reduce((product, size) => product * size, 1);
+    const words = new Uint16Array(frame.slice(at, end));
     header[field] = kind === 'int16' ? new Int16Array(words.buffer) : matrix(shape, words);
-    at += bytes;
+    at = end;
   }
+  if (at !== frame.byteLength) throw new Error(`${header.type}: ${frame.byteLength} bytes instead of ${at}`);
   return known(header);
+}
+
+function parse(text: string, most: number): Header {
+  if (text.length > most) throw new Error(`a message of more than ${most} bytes`);
+  return JSON.parse(text) as Header;
+}
+
+/** Whether sizes are some of an array; a frame's bytes bound each, also where another one is 0 and nothing was sent. */
+function isShape(sizes: unknown, axes: number): sizes is number[] {
+  return Array.isArray(sizes) && sizes.length === axes && sizes.every((size) => Number.isInteger(size) && size >= 0 && size <= MAX_BINARY_FRAME);
 }
 
 function known(header: Header): ServerMessage {

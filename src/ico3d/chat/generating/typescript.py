@@ -26,6 +26,8 @@ CONSTANTS = {
     "EXPRESSION_FPS": "rows per second",
     "RESUME_SECONDS": "",
     "BEAT_SECONDS": "",
+    "MAX_TEXT_FRAME": "bytes",
+    "MAX_BINARY_FRAME": "bytes",
 }
 """What the page uses, with its unit."""
 
