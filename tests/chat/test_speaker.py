@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from ico3d.chat.speaker import tool_call
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import MAX_ARGUMENTS, Call
@@ -18,6 +20,11 @@ def test_long_arguments_are_left_out_and_no_call_is_lost():
     assert json.loads(tool_call("note", fitting).arguments) == fitting
     longer = tool_call("n" * 300, {"text": fitting["text"] + "x"})
     assert longer.arguments == "{}" and isinstance(decode_server(encode(longer)), Call)
+
+
+@pytest.mark.parametrize("arguments", [[1, 2], "x", 5, None, {"mood": float("inf")}])
+def test_arguments_that_are_no_object_of_json_are_left_out(arguments):
+    assert decode_server(encode(tool_call("mood", arguments))) == Call("mood", "{}")
 
 
 def test_halves_of_characters_lose_no_call():

@@ -6,6 +6,7 @@ page schedules them, and its `clock` messages tell when the avatar has really fa
 """
 
 import asyncio
+import contextlib
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -203,7 +204,13 @@ class Speaker(FrameProcessor):
             left = seconds()
 
 
-def tool_call(name: str, arguments: Mapping[str, Any]) -> Call:
-    """What the page is told of a function that the language model calls."""
-    text = sendable(json.dumps(arguments, ensure_ascii=False, default=str))
+def tool_call(name: str, arguments: Any) -> Call:
+    """What the page is told of a function that the language model calls.
+
+    Models write what they like: arguments that are no object of JSON, or too long, are left out.
+    """
+    text = "{}"
+    if isinstance(arguments, Mapping):
+        with contextlib.suppress(ValueError):  # JSON has no infinity
+            text = sendable(json.dumps(arguments, ensure_ascii=False, default=str, allow_nan=False))
     return Call(sendable(name)[:LONGEST_NAME], text if len(text) <= MAX_ARGUMENTS else "{}")

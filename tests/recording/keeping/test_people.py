@@ -45,7 +45,23 @@ def test_a_voice_has_a_consent_of_its_own(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["", " ", "..", "../x", "a/b", "a\\b", ".x", "-x", "x" * 41, "x.y", "x\0", "1a", "a\nb"]
+    "name",
+    [
+        "",
+        " ",
+        "..",
+        "../x",
+        "a/b",
+        "a\\b",
+        ".x",
+        "-x",
+        "x" * 41,
+        "x.y",
+        "x\0",
+        "1a",
+        "a\nb",
+        "\u0301a",
+    ],
 )
 def test_names_that_lead_elsewhere_are_none(tmp_path, name):
     people = People(tmp_path / "in")
@@ -57,9 +73,10 @@ def test_names_that_lead_elsewhere_are_none(tmp_path, name):
 
 
 def test_names_of_all_scripts_are_kept(tmp_path):
-    for name in ("Zoë", "李雷", "José Núñez", "Anne-Marie 2"):
+    names = ["Zoë", "李雷", "José Núñez", "Anne-Marie 2", "प्रिया", "தமிழ்", "ภูมิ"]
+    for name in names:
         assert begun(tmp_path, name).name == name
-    assert sorted(People(tmp_path).names()) == sorted(["Zoë", "李雷", "José Núñez", "Anne-Marie 2"])
+    assert sorted(People(tmp_path).names()) == sorted(names)
 
 
 @pytest.mark.parametrize(

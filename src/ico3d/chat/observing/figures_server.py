@@ -1,5 +1,6 @@
 """The server of an operator's figures, which strangers cannot fill with silent connections."""
 
+import contextlib
 import socket
 import threading
 from socketserver import ThreadingMixIn
@@ -10,6 +11,8 @@ from prometheus_client import CollectorRegistry, make_wsgi_app
 
 SILENCE = 10.0
 """Seconds after which a connection without a request is closed."""
+LONGEST = 20.0
+"""Seconds after which any connection is closed, such as one that sends a letter now and then."""
 MOST_AT_ONCE = 16
 """Connections at the same time, each of which takes a thread."""
 
@@ -40,10 +43,14 @@ class _Server(ThreadingMixIn, WSGIServer):
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Answers, and gives the place back."""
+        """Answers, in time or not at all, and gives the place back."""
+        end = threading.Timer(LONGEST, _end, [request])
+        end.daemon = True
+        end.start()
         try:
             super().process_request_thread(request, client_address)
         finally:
+            end.cancel()
             self._places.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -52,6 +59,12 @@ class _Server(ThreadingMixIn, WSGIServer):
 
 class _Server6(_Server):
     address_family = socket.AF_INET6
+
+
+def _end(connection: socket.socket) -> None:
+    """Ends a connection, whatever its thread waits for."""
+    with contextlib.suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)
 
 
 def serve_figures(registry: CollectorRegistry, host: str, port: int) -> int:

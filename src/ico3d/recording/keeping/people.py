@@ -5,6 +5,7 @@ import logging
 import re
 import secrets
 import shutil
+import unicodedata
 from datetime import date
 from pathlib import Path
 
@@ -27,8 +28,8 @@ from ico3d.recording.refusals import Refused, bad_name, full_disk
 
 log = logging.getLogger(__name__)
 
-NAME = re.compile(r"[^\W\d_][\w -]{0,39}")
-"""What may be the name of a person, and so of a folder and a file."""
+LONGEST_NAME = 40
+"""Letters of the name of a person, and so of a folder and a file."""
 GONE = re.compile(r"\..+\.[0-9a-f]{16}\.gone")
 """Names of folders that are being removed."""
 MOST = 100
@@ -48,7 +49,7 @@ class People:
     def names(self) -> list[str]:
         """Whose recordings there are, sorted."""
         found = (file.parent.name for file in self.folder.glob(f"*/{CONSENT_FILE}"))
-        return sorted(name for name in found if NAME.fullmatch(name) and self._is_here(name))
+        return sorted(name for name in found if is_name(name) and self._is_here(name))
 
     def person(self, name: str) -> Person:
         """Somebody who agreed.
@@ -142,6 +143,13 @@ class People:
             log.warning("%s", error)
 
 
+def is_name(text: str) -> bool:
+    """Whether a text may be a name: letters with their marks, digits, spaces and hyphens."""
+    others = text[1:]
+    marked = all(c.isalnum() or c in "_ -" or unicodedata.category(c)[0] == "M" for c in others)
+    return text[:1].isalpha() and len(text) <= LONGEST_NAME and marked
+
+
 def checked_name(name: str) -> str:
     """A name as it is kept.
 
@@ -149,6 +157,6 @@ def checked_name(name: str) -> str:
         Refused: If it is none.
     """
     name = spelled("NFC", name).strip()
-    if not NAME.fullmatch(name):
+    if not is_name(name):
         raise bad_name()
     return name
