@@ -45,6 +45,7 @@ function pageOf(path: string): string {
       <ico3d-avatar lang="fr" style="max-width: 100%"></ico3d-avatar><ico3d-avatar mode="floating"></ico3d-avatar></main>
       <script type="module" src="${server.url}embed.js"></script></html>`,
     '/two': example.replace(/<ico3d-avatar.*>/, '<ico3d-avatar autoconnect style="width: 160px; height: 160px"></ico3d-avatar>'.repeat(2)),
+    '/elsewhere': example.replace(/<ico3d-avatar.*>/, ['javascript:alert(1)', 'data:text/html,a', 'blob:x'].map((where) => `<ico3d-avatar lang="en" server="${where}"></ico3d-avatar>`).join('')),
     '/framed': `<iframe src="${server.url}check" width="400" height="340"></iframe>`,
     '/alone': `<div id="place" style="width: 160px; height: 160px"></div>
       <script type="module">
@@ -172,6 +173,16 @@ describe('an avatar in the page of another origin', () => {
     expect(await stranger.page.evaluate(() => customElements.get('ico3d-avatar') === undefined)).toBe(true);
     await stranger.browser.close();
   });
+});
+
+test('an address that no server can have is told, and nothing else', async () => {
+  const { browser, page } = await visit('/elsewhere');
+  const errors: string[] = [];
+  page.on('pageerror', ({ message }) => errors.push(message));
+  await page.reload();
+  await page.waitForFunction(() => [...document.querySelectorAll('ico3d-avatar')].every(({ shadowRoot }) => shadowRoot?.textContent?.includes('address')));
+  expect(errors).toEqual([]);
+  await browser.close();
 });
 
 test('two on one page have a talk each, and one stays when the other goes', async () => {

@@ -172,10 +172,11 @@ export class AvatarElement extends HTMLElement {
     return this.server;
   }
 
-  /** Where the page of the avatar is; null where no attribute tells it. */
+  /** Where the page of the avatar is; null where no attribute tells it, or one names what no server is. */
   private address(): URL | null {
     const server = this.getAttribute('server') ?? AvatarElement.server;
     if (server === null || !URL.canParse(server, document.baseURI)) return null;
+    if (!/^https?:$/.test(new URL(server, document.baseURI).protocol)) return null;
     const folder = (address: string) => (address.endsWith('/') ? address : `${address}/`);
     const base = new URL(folder(server), document.baseURI);
     const avatar = this.getAttribute('avatar');

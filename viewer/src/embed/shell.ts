@@ -43,5 +43,5 @@ export function fillPage({ page: holder, words }: Shell, server: URL | null): vo
   delete holder.dataset.drawer;
   delete holder.dataset.sheet;
   words.translate();
-  for (const link of holder.querySelectorAll('a')) link.href = server ? new URL(link.getAttribute('href')!, server).href : '';
+  for (const link of holder.querySelectorAll<HTMLAnchorElement>('a[href]')) link.href = server ? new URL(link.getAttribute('href')!, server).href : '';
 }
