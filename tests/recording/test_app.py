@@ -373,3 +373,12 @@ async def test_no_talk_begins_of_somebody_who_was_deleted_meanwhile(room, monkey
             await asyncio.sleep(0.1)
             room.people.delete("Ida")
         assert ((await talk).status_code, served) == (404, [])
+
+
+def test_what_is_deleted_meanwhile_is_not_there(page, monkeypatch, video):
+    def gone(*_):
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory")
+
+    monkeypatch.setattr(Person, "append", gone)
+    answer = _send(page, "text-1", video)
+    assert (answer.status_code, answer.json()["code"]) == (404, "part")

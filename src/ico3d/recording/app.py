@@ -127,7 +127,9 @@ def make_app(room: Room, host: str, sites: Sites, names: tuple[str, ...] = ()) -
 async def _refuse(request: Request, error: Exception) -> Response:
     """An error as one sentence."""
     del request
-    if isinstance(error, OSError):
+    if isinstance(error, FileNotFoundError):  # somebody deleted it meanwhile
+        error = Refused("part", "this is not there any more.", 404)
+    elif isinstance(error, OSError):
         if error.errno not in FULL:
             raise error
         error = full_disk()
