@@ -1,3 +1,5 @@
+import contextlib
+import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -5,8 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from ico3d.common import espeak_process
 from ico3d.common.espeak import synthesize
-from ico3d.errors import SettingsError
+from ico3d.common.espeak_process import process
+from ico3d.errors import ServiceError, SettingsError
 
 pytest.importorskip("espeakng_loader")
 
@@ -91,3 +95,54 @@ def test_a_missing_package_names_its_extra():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "ico3d[voice]" in done.stdout
+
+
+def test_a_process_that_ends_is_followed_by_another():
+    before = synthesize("Good morning.")
+    assert process._process is not None
+    process._process.kill()
+    with pytest.raises(ServiceError, match="failed at a text"):
+        synthesize("Good morning.")
+    np.testing.assert_array_equal(synthesize("Good morning.").samples, before.samples)
+
+
+def test_a_text_that_breaks_the_library_ends_no_process_but_its_own():
+    with contextlib.suppress(ServiceError):  # some versions of the library can speak it
+        synthesize("'s" * 90)
+    assert len(synthesize("Good morning.").samples) > 1000
+
+
+def test_a_text_without_an_end_is_given_up(monkeypatch):
+    synthesize("Good morning.")
+    monkeypatch.setattr(espeak_process, "LONGEST", 0.05)
+    with pytest.raises(ServiceError, match="failed at a text"):
+        synthesize("a long sentence " * 3000)
+    monkeypatch.undo()
+    assert len(synthesize("Good morning.").samples) > 1000
+
+
+def test_whoever_stops_in_the_middle_leaves_no_half_answer(monkeypatch):
+    before = synthesize("One.")
+    read = espeak_process._read
+
+    def stop(pipe, count):
+        read(pipe, count)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(espeak_process, "_read", stop)
+    with pytest.raises(KeyboardInterrupt):
+        synthesize("A longer sentence.")
+    monkeypatch.undo()
+    np.testing.assert_array_equal(synthesize("One.").samples, before.samples)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_fork_speaks_by_a_process_of_its_own():
+    before = synthesize("One.")
+    child = os.fork()
+    if child == 0:
+        same = np.array_equal(synthesize("One.").samples, before.samples)
+        process.close()
+        os._exit(0 if same else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    np.testing.assert_array_equal(synthesize("One.").samples, before.samples)

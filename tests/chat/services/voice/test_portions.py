@@ -11,7 +11,7 @@ from pipecat.frames.frames import ErrorFrame, TTSAudioRawFrame
 from ico3d.chat.frames import PhonemesFrame
 from ico3d.chat.services.voice.base import PieceVoice, Spoken
 from ico3d.chat.services.voice.lasting import Lasting
-from ico3d.chat.services.voice.portions import MOST, portions
+from ico3d.chat.services.voice.portions import MOST, parted, portions
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.espeak import Phoneme
 
@@ -39,6 +39,32 @@ def test_nothing_is_lost_and_no_portion_is_long(text):
     found = list(portions(text))
     assert "".join(found) == text
     assert all(0 < len(portion) <= MOST for portion in found)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (SENTENCE, SENTENCE),
+        ("s'" * 40, "s'" * 32 + " " + "s'" * 8),
+        ("ness" * 33, " ".join(["ness" * 16] * 2 + ["ness"])),
+        ("b" * 64, "b" * 64),
+        ("你好" * 90, "你好" * 90),
+        ("x-" * 90, "x-" * 90),
+    ],
+)
+def test_no_word_is_endless(text, parts):
+    assert parted(text) == parts
+
+
+async def test_every_voice_gets_words_that_end():
+    asked = []
+
+    async def speak(text, context_id):
+        asked.append(text)
+        yield TTSAudioRawFrame(bytes(480), SPEECH_RATE, 1)
+
+    [_ async for _ in Lasting(speak).run_tts("'s" * 90, "answer")]
+    assert asked == [parted("'s" * 90)]
 
 
 async def test_a_voice_speaks_portion_by_portion_and_stops_between_them():

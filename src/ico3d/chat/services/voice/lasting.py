@@ -7,6 +7,7 @@ from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.pipecat_internals import replace_run_tts
+from ico3d.chat.services.voice.portions import parted
 
 LETTER, LEAST = 2.0, 20.0
 """Seconds of sound for each letter of a piece, and for a piece however short.
@@ -19,7 +20,7 @@ Speak = Callable[[str, str], AsyncGenerator[Frame | None, None]]
 
 
 class Lasting:
-    """Wraps a voice's `run_tts`, and ends sound that is far longer than its text takes to say."""
+    """Wraps a voice's `run_tts`: no endless words go in, and no endless sound comes out."""
 
     def __init__(self, speak: Speak):
         """Takes the voice's own `run_tts`."""
@@ -33,7 +34,7 @@ class Lasting:
         most = min(self._left, max(LEAST, LETTER * len(text)))
         seconds = 0.0
         if most > 0:  # else the voice is not even asked
-            async with contextlib.aclosing(self._speak(text, context_id)) as sound:
+            async with contextlib.aclosing(self._speak(parted(text), context_id)) as sound:
                 async for frame in sound:
                     seconds += duration(frame)
                     if seconds > most:

@@ -1,10 +1,26 @@
 """Portions of a text that are spoken one after the other, so that no text keeps others waiting."""
 
+import re
 import unicodedata
 from collections.abc import Iterator
 
 MOST = 200
 """Letters of a portion, written out: the one letter `ﷺ` is read as eighteen."""
+
+
+_WORD = 64
+_ENDLESS = re.compile(
+    rf"([^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff]|['’]){{{_WORD}}}(?=\S)"
+)
+
+
+def parted(text: str) -> str:
+    """A text whose words have at most 64 letters, about as many as the longest of German.
+
+    espeak-ng, which Piper and Kokoro ask for phonemes, too, writes beyond a buffer where a word has
+    160 letters. Scripts that have no spaces are left as they are.
+    """
+    return _ENDLESS.sub(r"\g<0> ", text)
 
 
 def portions(text: str) -> Iterator[str]:
