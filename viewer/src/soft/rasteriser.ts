@@ -101,7 +101,6 @@ export class Rasteriser {
     const spread = performance.now();
     while (!kernel.bin(Number(this.room.pairs < MOST_PAIRS))) {
       this.room.pairs *= 2;
-      this.room.gaussians = 0;
       this.layOut(frame);
       this.project(frame);
     }
@@ -170,11 +169,15 @@ export class Rasteriser {
     const gaussians = placed.reduce((sum, { drawn }) => sum + drawn, 0);
     const tiles = (end - first) * Math.ceil(height / TILE_HEIGHT);
     const { room } = this;
-    if (gaussians <= room.gaussians && tiles <= room.tiles) return;
-    room.gaussians = Math.max(gaussians, room.gaussians);
-    room.tiles = Math.max(tiles, room.tiles);
+    if (gaussians > room.gaussians) room.gaussians = sizeFor(gaussians);
+    if (tiles > room.tiles) room.tiles = sizeFor(tiles);
     this.kernel.layOut(room.gaussians, room.pairs, room.tiles);
   }
+}
+
+/** How much room is made where so much is needed, so that what grows little by little takes new room seldom. */
+function sizeFor(needed: number): number {
+  return 2 ** Math.ceil(Math.log2(needed));
 }
 
 /** A place in the kernel's memory that grows, and never gives back. */
@@ -190,7 +193,7 @@ class Room {
   /** The address of so many bytes. */
   at(bytes: number): number {
     if (bytes > this.size) {
-      this.size = 2 ** Math.ceil(Math.log2(bytes));
+      this.size = sizeFor(bytes);
       this.place = this.kernel.reserve(this.size);
     }
     return this.place;

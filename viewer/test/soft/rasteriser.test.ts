@@ -57,6 +57,19 @@ describe('the rasteriser', () => {
     expect(worst(draw(frame(0, COLUMNS), small), draw(frame(0, COLUMNS)))).toBe(0);
   });
 
+  test('takes hardly more memory for a window that becomes larger little by little, and for more and more Gaussians', async () => {
+    const drawn = async (sizes: readonly (readonly [height: number, count: number])[]) => {
+      const kernel = await makeKernel();
+      const growing = new Rasteriser(kernel, 2 ** 12);
+      growing.put(0, reference.source);
+      for (const [height, count] of sizes) growing.draw({ ...frame(0, COLUMNS, count), height }, clothOf(reference.background, WIDTH, height));
+      return kernel.memory.buffer.byteLength;
+    };
+    const largest = await drawn([[1600, 2000]]);
+    const steps = Array.from({ length: 200 }, (_, i) => [8 * i + 8, 10 * i + 10] as const);
+    expect(await drawn(steps)).toBeLessThan(3 * largest);
+  });
+
   test('makes no room for what a Gaussian has outside of the picture', async () => {
     const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
     const [pictures, bytes] = [[] as Uint8Array[], [] as number[]];

@@ -21,7 +21,11 @@ let spare: usize = 0;
 let pairs: usize = 0;
 let entries: usize = 0;
 let counts: usize = 0;
+let digests: usize = 0;
+let shown: usize = 0;
+let mostGaussians: i32 = 0;
 let mostPairs: u32 = 0;
+let mostTiles: i32 = 0;
 
 let firstColumn: i32 = 0;
 let endColumn: i32 = 0;
@@ -33,16 +37,29 @@ let changedRight: i32 = 0;
 let changedTop: i32 = 0;
 let changedBottom: i32 = 0;
 
-/** Lays out the memory for pictures of so many Gaussians, pairs of splat and tile, and tiles, at most. */
+/**
+ * Lays out the memory for pictures of so many Gaussians, pairs of splat and tile, and tiles, at most.
+ * What there is room for stays where it is: nothing is ever given back.
+ */
 export function layOut(gaussians: i32, newMostPairs: u32, tiles: i32): void {
-  useRoom(reserve(<usize>gaussians * RECORD), reserve(<usize>gaussians << 2));
-  order = reserve(<usize>gaussians << 3);
-  spare = reserve(<usize>gaussians << 3);
-  mostPairs = newMostPairs;
-  pairs = reserve(<usize>newMostPairs << 3);
-  entries = reserve(<usize>newMostPairs << 2);
-  counts = reserve(<usize>tiles << 2);
-  useRoomToKeep(reserve(<usize>gaussians << 3), reserve(<usize>tiles << 3));
+  if (gaussians > mostGaussians) {
+    mostGaussians = gaussians;
+    useRoom(reserve(<usize>gaussians * RECORD), reserve(<usize>gaussians << 2));
+    order = reserve(<usize>gaussians << 3);
+    spare = reserve(<usize>gaussians << 3);
+    digests = reserve(<usize>gaussians << 3);
+  }
+  if (newMostPairs > mostPairs) {
+    mostPairs = newMostPairs;
+    pairs = reserve(<usize>newMostPairs << 3);
+    entries = reserve(<usize>newMostPairs << 2);
+  }
+  if (tiles > mostTiles) {
+    mostTiles = tiles;
+    counts = reserve(<usize>tiles << 2);
+    shown = reserve(<usize>tiles << 3);
+  }
+  useRoomToKeep(digests, shown);
 }
 
 /** Begins a picture of which the columns of tiles from `first` to `end` are drawn. */
