@@ -1,7 +1,6 @@
 """Finds where a body rests and at which frames its motion may turn around.
 
 The paper picks these key frames by hand (section "Procedural Body Animation"). Here they follow
-from ico3d.common.files import read_small
 from the speed of the hands, which move most: a body rests where its hands are slow for long, and
 its motion can turn around or be held where they slow down away from rest.
 """
@@ -24,6 +23,8 @@ SEEN = 0.1
 """Opacity above which a Gaussian counts."""
 FASTEST = (0.9, 0.99)
 """Quantiles of speed between which Gaussians count as hands and forearms; above are strays."""
+MOST_PLACES = 20_000_000
+"""Most positions of a clip that are looked at; of more, only every second, third, … Gaussian."""
 MOST_POINTS = 4000
 """Most Gaussians of a frame that are compared with the rest pose."""
 CALM = 0.05
@@ -100,12 +101,17 @@ def window_places(body: MovingBody) -> Iterator[np.ndarray]:
     Yields:
         (frames, N, 3) metres in the world for each window; all Gaussians where none is visible.
     """
+    frames = sum(span.last - span.first + 1 for span in body.windows)
     for index, span in enumerate(body.windows):
         taus = np.linspace(0, 1, span.last - span.first + 1)
-        shown = [body.window_gaussians(index, float(tau)) for tau in taus]
-        opacities = torch.stack([gaussians.opacities for gaussians in shown]).mean(0)  # (N,)
+        opacities, means = torch.zeros(()), []
+        for tau in taus:
+            shown = body.window_gaussians(index, float(tau))
+            some = slice(None, None, 1 + frames * len(shown.means) // MOST_PLACES)
+            opacities = opacities + shown.opacities[some].cpu() / len(taus)  # (N,)
+            means.append(shown.means[some].cpu().numpy())
         seen = opacities > SEEN if (opacities > SEEN).any() else opacities >= 0
-        yield torch.stack([gaussians.means[seen] for gaussians in shown]).cpu().numpy()
+        yield np.stack(means)[:, seen.numpy()]
 
 
 def read_animation(folder: Path, body: MovingBody) -> Animation | None:
