@@ -41,7 +41,7 @@ export class Controls {
     this.stop = byId(root, 'stop');
     this.mute = byId(root, 'mute');
     this.microphone.append(icon('microphone'));
-    this.talk.append(icon('talk'));
+    this.talk.append(icon('radio'));
     this.stop.prepend(icon('stop'));
     this.send = byId(root, 'send');
     this.send.append(icon('send'));
