@@ -7,6 +7,7 @@ import { say, type Sentence, type Tongue } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
 import { isForOthers } from './keyboard/keys.ts';
+import { markTyping } from './keyboard/typing.ts';
 
 const CLICK = 350; // ms; who clicks the button to talk does not know that it is held
 
@@ -45,6 +46,7 @@ export class Controls {
     this.stop.prepend(icon('stop'));
     this.send = byId(root, 'send');
     this.send.append(icon('send'));
+    markTyping(this.form, this.input, signal);
     const ask = () => words.write(this.input, askIn(foreignTo(words.language, languages)), 'placeholder');
     words.onChange(ask, signal);
     ask();
