@@ -6,7 +6,7 @@ import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence, type Tongue } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
-import { isForOthers } from './keyboard/keys.ts';
+import { isFor, isForOthers, isForTexts } from './keyboard/keys.ts';
 import { markTyping } from './keyboard/typing.ts';
 
 const CLICK = 350; // ms; who clicks the button to talk does not know that it is held
@@ -68,8 +68,8 @@ export class Controls {
     this.bindTalk(conversation, notice);
     this.bindMute(conversation);
     this.hear('keydown', (event) => {
-      if (event.key === 'Escape') conversation.interrupt();
-      if (event.key === '/' && this.takesSlash(event)) {
+      if (isFor('escape', event)) conversation.interrupt();
+      if (isFor('write', event) && !isForTexts(event)) {
         event.preventDefault();
         this.input.focus();
       }
@@ -90,7 +90,7 @@ export class Controls {
     };
     this.mute.onclick = toggle;
     this.hear('keydown', (event) => {
-      if (event.key.toLowerCase() === 'm' && !event.repeat && !isForOthers(event)) toggle();
+      if (isFor('mute', event) && !event.repeat && !isForOthers(event)) toggle();
     });
     show(rememberedInTab('muted') === 'true');
   }
@@ -111,11 +111,11 @@ export class Controls {
     };
     this.talk.oncontextmenu = (event) => event.preventDefault(); // a long touch
     this.hear('keydown', (event) => {
-      if (event.key !== ' ' || !this.takesSpace(event.target)) return;
+      if (!isFor('talk', event) || !this.takesSpace(event.target)) return;
       event.preventDefault();
       if (!event.repeat) press();
     });
-    this.hear('keyup', (event) => event.key === ' ' && release());
+    this.hear('keyup', (event) => isFor('talk', event) && release());
     addEventListener('blur', release, { signal: this.signal });
   }
 
@@ -136,13 +136,6 @@ export class Controls {
   /** Where a visitor goes on who stopped an answer; with fingers, the text box would open a keyboard over the avatar. */
   private next(): HTMLElement {
     return matchMedia('(pointer: coarse)').matches ? this.microphone : this.input;
-  }
-
-  /** Whether a slash leads to the text box: everywhere but inside a text that is being typed. */
-  private takesSlash({ target, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean {
-    if (ctrlKey || metaKey || altKey) return false;
-    if (target === this.input) return this.input.value === '';
-    return !(target as Element).closest('textarea, [contenteditable], input:not([type=radio], [type=range])');
   }
 
   setTalking(held: boolean): void {
