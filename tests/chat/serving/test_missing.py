@@ -31,7 +31,7 @@ async def test_a_browser_reads_it_in_plain_words_and_finds_the_start(get, path):
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
     assert "There is nothing here" in answer.text and "detail" not in answer.text
-    link = re.search(r'href="([^"]+)"', answer.text)[1]
+    link = re.search(r'<a href="([^"]+)"', answer.text)[1]
     assert urljoin(f"http://server/folder{path}", link) == "http://server/folder/"
 
 

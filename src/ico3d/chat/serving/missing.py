@@ -33,6 +33,7 @@ PAGE = """<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="dark light">
+<link rel="icon" href="data:,">
 <title>{title}</title>
 <style>
 :root {{ --backdrop: #131416; --ink: #f2efeb; --ink-soft: #b9b4ad; --accent: #e0ad82 }}
