@@ -96,7 +96,7 @@ export class Visit {
     this.ports = ports;
     showTheme(root); // until there is a button: who waits, or reads of an error, is not dazzled either
     this.overlay = new Overlay(root, ports.words, this.ending.signal, () => ports.reload());
-    byId<HTMLAnchorElement>(root, 'check').href = server.check();
+    for (const id of ['check', 'help-check']) byId<HTMLAnchorElement>(root, id).href = server.check();
     this.run().catch((error: unknown) => this.fail(error));
   }
 

@@ -41,7 +41,7 @@ test('each line says what is so; microphone and sound are tried, and the report 
   expect(await words('frames')).toMatch(/^\d+ frames? per second/);
   expect(await words('socket')).toMatch(/^The server answers within [\d.]+ ms/);
   expect(['none', 'good']).toContain(await verdict('headset'));
-  for (const script of scripts) expect((await (await page.request.get(script)).body()).length, script).toBeLessThan(90_000); // the texts of six languages have 60,000, three has 700,000
+  for (const script of scripts) expect((await (await page.request.get(script)).body()).length, script).toBeLessThan(120_000); // the texts of six languages have 90,000, three has 700,000
 
   await page.click('#microphone button');
   await page.waitForFunction(() => document.querySelector<HTMLMeterElement>('#microphone meter')!.value > 0.01);

@@ -128,6 +128,32 @@ test('a picture that was clicked has no frame, one that the keyboard has reached
   await page.keyboard.press('Home');
 });
 
+test('a long figure takes the room beside its name', async () => {
+  await page.setViewportSize({ width: 1280, height: 720 });
+  await page.click('#panel-button');
+  const name = page.locator('#panel dt', { hasText: 'drawn by' });
+  await name.waitFor();
+  const [lines, share] = await name.evaluate((term) => {
+    const value = term.nextElementSibling as HTMLElement;
+    value.textContent = 'the processor, as there is no graphics card: WebGL would be slower (ANGLE (Mesa, llvmpipe (LLVM 15.0.6 256 bits), OpenGL ES 3.2))';
+    const { width, height } = value.getBoundingClientRect();
+    const line = Number.parseFloat(getComputedStyle(value).lineHeight);
+    return [Math.round(height / line), width / document.getElementById('figures')!.clientWidth];
+  });
+  await page.keyboard.press('Escape');
+  expect(lines).toBeLessThanOrEqual(5);
+  expect(share).toBeGreaterThan(0.65);
+});
+
+test('a service without another to choose is told in words', async () => {
+  await page.click('#settings-button');
+  const names = await page.locator('#services input').evaluateAll((inputs) => inputs.map((input) => (input as HTMLInputElement).name));
+  const kinds = await page.locator('#services > :not(details)').allTextContents();
+  await page.keyboard.press('Escape');
+  expect(names.filter((name) => names.indexOf(name) === names.lastIndexOf(name))).toEqual([]);
+  expect(kinds.map((text) => /^(Listens|Thinks|Speaks)./.test(text))).toEqual([true, true, true]);
+});
+
 test.each([
   [352, 476],
   [352, 516],

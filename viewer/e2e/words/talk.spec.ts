@@ -240,6 +240,7 @@ test('the visitor chooses language and captions, which are remembered; all of it
   const { page } = browser;
   await page.focus('#settings-button');
   await page.keyboard.press('Enter');
+  await page.keyboard.press('Tab'); // to the help
   await page.keyboard.press('Tab'); // to its ✕
   await page.keyboard.press('Tab');
   expect(await page.evaluate(() => document.activeElement!.id)).toBe('language');

@@ -6,7 +6,8 @@ import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence, type Tongue } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
-import { isForOthers } from './keyboard/keys.ts';
+import { isFor, isForOthers, isForTexts } from './keyboard/keys.ts';
+import { markTyping } from './keyboard/typing.ts';
 
 const CLICK = 350; // ms; who clicks the button to talk does not know that it is held
 
@@ -41,10 +42,11 @@ export class Controls {
     this.stop = byId(root, 'stop');
     this.mute = byId(root, 'mute');
     this.microphone.append(icon('microphone'));
-    this.talk.append(icon('talk'));
+    this.talk.append(icon('radio'));
     this.stop.prepend(icon('stop'));
     this.send = byId(root, 'send');
     this.send.append(icon('send'));
+    markTyping(this.form, this.input, signal);
     const ask = () => words.write(this.input, askIn(foreignTo(words.language, languages)), 'placeholder');
     words.onChange(ask, signal);
     ask();
@@ -66,8 +68,8 @@ export class Controls {
     this.bindTalk(conversation, notice);
     this.bindMute(conversation);
     this.hear('keydown', (event) => {
-      if (event.key === 'Escape') conversation.interrupt();
-      if (event.key === '/' && this.takesSlash(event)) {
+      if (isFor('escape', event)) conversation.interrupt();
+      if (isFor('write', event) && !isForTexts(event)) {
         event.preventDefault();
         this.input.focus();
       }
@@ -88,7 +90,7 @@ export class Controls {
     };
     this.mute.onclick = toggle;
     this.hear('keydown', (event) => {
-      if (event.key.toLowerCase() === 'm' && !event.repeat && !isForOthers(event)) toggle();
+      if (isFor('mute', event) && !event.repeat && !isForOthers(event)) toggle();
     });
     show(rememberedInTab('muted') === 'true');
   }
@@ -109,11 +111,11 @@ export class Controls {
     };
     this.talk.oncontextmenu = (event) => event.preventDefault(); // a long touch
     this.hear('keydown', (event) => {
-      if (event.key !== ' ' || !this.takesSpace(event.target)) return;
+      if (!isFor('talk', event) || !this.takesSpace(event.target)) return;
       event.preventDefault();
       if (!event.repeat) press();
     });
-    this.hear('keyup', (event) => event.key === ' ' && release());
+    this.hear('keyup', (event) => isFor('talk', event) && release());
     addEventListener('blur', release, { signal: this.signal });
   }
 
@@ -134,13 +136,6 @@ export class Controls {
   /** Where a visitor goes on who stopped an answer; with fingers, the text box would open a keyboard over the avatar. */
   private next(): HTMLElement {
     return matchMedia('(pointer: coarse)').matches ? this.microphone : this.input;
-  }
-
-  /** Whether a slash leads to the text box: everywhere but inside a text that is being typed. */
-  private takesSlash({ target, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean {
-    if (ctrlKey || metaKey || altKey) return false;
-    if (target === this.input) return this.input.value === '';
-    return !(target as Element).closest('textarea, [contenteditable], input:not([type=radio], [type=range])');
   }
 
   setTalking(held: boolean): void {

@@ -4,6 +4,7 @@ const PATHS = {
   sound: 'M4.5 9.5v5h3.2l4.3 3.8V5.7L7.7 9.5ZM15.2 9.2a4 4 0 0 1 0 5.6M17.8 6.6a7.6 7.6 0 0 1 0 10.8',
   muted: 'M4.5 9.5v5h3.2l4.3 3.8V5.7L7.7 9.5ZM15.5 9.7l4.6 4.6M20.1 9.7l-4.6 4.6',
   talk: 'M4.5 5.5h15v10H11l-4 4v-4H4.5z',
+  radio: 'M6.5 8.5h8.6A1.9 1.9 0 0 1 17 10.4v8.7a1.9 1.9 0 0 1-1.9 1.9H8.4a1.9 1.9 0 0 1-1.9-1.9V2.8M13.6 8.5V5.6M10 12.6h3.5M10 16.4h3.5', // on such a one a button is held while one speaks
   close: 'M6.5 6.5l11 11M17.5 6.5l-11 11',
   send: 'M12 19V5M6 11l6-6 6 6',
   stop: 'M7 7h10v10H7z',

@@ -9,6 +9,7 @@ import { byId } from './elements.ts';
 import { LineNotice } from './line.ts';
 import { Overlay } from './overlay.ts';
 import { markPressed } from './keyboard/pressed.ts';
+import { Help } from './sheets/help.ts';
 import { Memory } from './sheets/memory.ts';
 import { Panel } from './sheets/panel.ts';
 import { Settings } from './sheets/settings.ts';
@@ -44,6 +45,7 @@ export function makePage(
   const line = new LineNotice(root, words, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
+  new Help(root, words, () => overlay.isShown, signal);
   const memory = new Memory(root, words, talker.home);
   const transcript = new Transcript(root, words, talker, () => captions.clear(), signal);
   let choose: (offer: Offer) => void = () => {};

@@ -5,6 +5,7 @@ import type { PageWords } from '../words/page-words.ts';
 import { say } from '../words/text.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
+import { isFor } from './keyboard/keys.ts';
 
 const REFRESH = 100; // ms
 
@@ -48,7 +49,7 @@ export class PlayerBar {
   }
 
   private space(event: KeyboardEvent): void {
-    if (event.key !== ' ') return;
+    if (!isFor('play', event)) return;
     event.preventDefault();
     this.toggle();
   }

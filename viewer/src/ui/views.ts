@@ -3,7 +3,7 @@ import type { Orbit } from '../stage/camera/orbit.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say } from '../words/text.ts';
 import { icon } from './icons.ts';
-import { isForOthers } from './keyboard/keys.ts';
+import { isForOthers, KEYS } from './keyboard/keys.ts';
 
 /**
  * A button for each view of somebody; their numbers are keys, wherever nothing is typed.
@@ -24,7 +24,7 @@ export function makeViewBar(orbit: Orbit, words: PageWords, keys: EventTarget, s
   show(orbit.view);
   orbit.onView = show;
   const press = (event: Event) => {
-    const view = VIEWS[Number((event as KeyboardEvent).key) - 1];
+    const view = VIEWS[KEYS.view.indexOf((event as KeyboardEvent).key)];
     if (view && !isForOthers(event as KeyboardEvent)) orbit.show(view);
   };
   keys.addEventListener('keydown', press, { signal });
@@ -33,7 +33,7 @@ export function makeViewBar(orbit: Orbit, words: PageWords, keys: EventTarget, s
 
 function makeButton(view: View, orbit: Orbit, words: PageWords): HTMLButtonElement {
   const button = document.createElement('button');
-  const key = String(VIEWS.indexOf(view) + 1);
+  const key = KEYS.view[VIEWS.indexOf(view)]!;
   button.type = 'button';
   button.className = 'round quiet';
   const name = say(`view.${view}`);

@@ -9,6 +9,7 @@ import { Glance } from './glance.ts';
 import type { XrMode, XrPorts } from './ports.ts';
 import { Reminder } from './reminder.ts';
 import { APART, Rig } from './rig.ts';
+import { Sight } from './sight.ts';
 import { VoiceInSpace } from './sound.ts';
 import { Stick } from './stick.ts';
 import { Tools } from './tools.ts';
@@ -18,8 +19,6 @@ const USUAL_RATE = 72; // pictures/s, of headsets that do not tell theirs
 const HELD = 0.85; // of the headset's rate: what is less is seen
 const RETURNING = 4; // the lower button of a controller (xr-standard)
 const LEAVING = 5; // the upper one
-const UNSEEN = Math.PI / 4; // rad aside: what is there is hardly seen
-const LOST = 1.5; // s after which who is not seen is lost
 const MOUTH = 0.07; // m under the eyes
 const CHIN = 0.14;
 
@@ -46,7 +45,7 @@ export class Immersion implements Presentation {
   private readonly followed = new Set<Key>(); // hints after which the visitor has talked
   private readonly reminder = new Reminder();
   private reminds = false; // of what was followed already
-  private unseen = 0; // s for which the avatar has been out of sight
+  private readonly sight = new Sight();
 
   /**
    * Asks the device for a session and shows the stage in it; needs a click right before.
@@ -188,7 +187,12 @@ export class Immersion implements Presentation {
     if (wish === 'aim') this.point(source, frame, space);
     if (wish === 'go' && this.aim?.by === source) this.go(this.aim.at);
     if (this.passthrough) return; // in a room of their own visitors turn themselves
-    if (wish === 'left' || wish === 'right') this.rig.turn(wish === 'left' ? TURN : -TURN, this.eye());
+    if (wish === 'left' || wish === 'right') this.turn(wish === 'left' ? TURN : -TURN);
+  }
+
+  private turn(angle: number): void {
+    this.rig.turn(angle, this.eye());
+    this.sight.carry();
   }
 
   private point(by: XRInputSource, frame: XRFrame, space: XRReferenceSpace): void {
@@ -203,6 +207,7 @@ export class Immersion implements Presentation {
   private go(at: THREE.Vector3): void {
     if (this.passthrough) this.rig.meet(at, this.eye());
     else this.rig.go(this.rig.localToWorld(at.clone()), this.eye(), this.ahead());
+    this.sight.carry();
     this.aim = null;
     this.arc.visible = false;
   }
@@ -212,10 +217,11 @@ export class Immersion implements Presentation {
     const head = this.head.clone().premultiply(this.rig.matrixWorld);
     const visitor = new THREE.Vector3().setFromMatrixPosition(head);
     this.glance?.look(visitor, step);
-    this.unseen = Math.abs(this.rig.aside(this.eye(), this.ahead())) > UNSEEN ? this.unseen + step : 0;
-    const lost = this.unseen > LOST;
-    this.board.guide(lost && this.canReturn() ? this.ports.words.text(say('xr.return')) : '');
-    this.board.place(visitor, lost ? this.before(head) : this.face(CHIN), this.ground.up);
+    this.sight.pass(step, this.rig.aside(this.eye(), this.ahead()));
+    const { isLost } = this.sight;
+    const { up } = this.ground;
+    this.board.guide(isLost && this.canReturn() ? this.ports.words.text(say('xr.return')) : '');
+    this.board.place(visitor, isLost ? this.before(head) : this.sight.nearest(this.face(CHIN), visitor, up), up);
     this.voice?.place(this.face(MOUTH).applyMatrix4(head.invert()));
   }
 

@@ -4,7 +4,7 @@ import { judgeTrips, socketAdvice } from '../../src/check/network.ts';
 import { isSoftware } from '../../src/soft/graphics.ts';
 import { judgeGraphics, judgeRate } from '../../src/check/picture.ts';
 import { judgeLevel, judgeTone } from '../../src/check/sound.ts';
-import { english, say } from '../../src/words/text.ts';
+import { english, say, textOf, type Language } from '../../src/words/text.ts';
 
 test.each([
   [[], 'All that was checked works.'],
@@ -13,6 +13,11 @@ test.each([
   [[fair('a', 'b'), bad('c', 'd'), good('e')], 'Something does not work: see below what to do.'],
 ])('the worst finding is what the page says at its top', (findings: Finding[], sentence) => {
   expect(english(summary(findings))).toBe(sentence);
+});
+
+test('visitors are asked, not people in general, whether they hear the avatar', () => {
+  const asked = (language: Language) => textOf(say('check.sound.ask'), language);
+  expect([asked('en'), asked('de'), asked('fr')]).toEqual(['Can you hear the avatar?', 'Hören Sie den Avatar?', 'Entendez-vous l’avatar ?']);
 });
 
 test('a report tells what was found and what was not tried', () => {

@@ -23,6 +23,7 @@ from ico3d.chat.serving.bundle_files import BundleFiles
 from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
+from ico3d.chat.serving.missing import tell_missing
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.network.handshakes import behind_tls
 from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
@@ -134,7 +135,11 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
 
 
 def add_page(app: FastAPI) -> None:
-    """Adds the files of the page or, if it was not built, a sentence on how to build it."""
+    """Adds the files of the page or, if it was not built, a sentence on how to build it.
+
+    Browsers that come by a wrong address read so in plain words.
+    """
+    app.add_exception_handler(404, tell_missing)
     if (STATIC / "index.html").is_file():
         app.mount("/", PageFiles(STATIC))
         return

@@ -4,6 +4,7 @@ import type { StartCamera } from '../../bundle/manifest.ts';
 import { confine, freeScale, type Bounds, type Lens } from './bounds.ts';
 import { Flight, directionOf } from './flight.ts';
 import type { Framing, Picture, View } from './framing.ts';
+import type { CameraKey } from './keys.ts';
 import { listenToZooming, placeOn, type Place } from './zooming.ts';
 
 /** What the camera is pointed at, and what a visitor may do with it. */
@@ -280,7 +281,7 @@ export class Orbit {
   }
 
   private key(event: KeyboardEvent): void {
-    const moves: Record<string, () => void> = {
+    const moves: Record<CameraKey, () => void> = {
       ArrowLeft: () => this.turn(this.camera.up, KEY_STEP),
       ArrowRight: () => this.turn(this.camera.up, -KEY_STEP),
       ArrowUp: () => this.turn(this.right(), -KEY_STEP),
@@ -289,7 +290,7 @@ export class Orbit {
       '-': () => this.zoom(this.centre(), KEY_ZOOM),
       Home: () => this.show(this.subject.home),
     };
-    const move = moves[event.key];
+    const move = moves[event.key as CameraKey] as (() => void) | undefined;
     if (!move) return;
     event.preventDefault();
     this.interrupt();

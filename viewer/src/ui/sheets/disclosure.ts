@@ -1,5 +1,6 @@
 import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
+import { isFor } from '../keyboard/keys.ts';
 
 const STILL = 6; // pixels that a pointer may move in a click; farther, it turned the picture
 const ACTING = 'button, input, select, a, label, summary, form, section'; // what does something itself
@@ -16,6 +17,7 @@ export class Disclosure {
   private readonly part: HTMLElement;
   private readonly changed: (open: boolean) => void;
   private pressed: PointerEvent | null = null;
+  private before: HTMLElement | null = null; // had the focus when the sheet was opened
 
   /**
    * @param page what the sheets lie in, and keys and clicks are heard in
@@ -47,18 +49,24 @@ export class Disclosure {
 
   private close(): void {
     this.show(false);
-    this.button.focus();
+    this.back.focus();
   }
 
   private show(open: boolean): void {
     if (open) this.closeOther();
+    if (open) this.before = (this.page.getRootNode() as Document | ShadowRoot).activeElement as HTMLElement | null;
     const held = this.part.matches(':focus-within');
     this.part.hidden = !open;
-    if (held) this.button.focus(); // a keyboard goes on there
+    if (held) this.back.focus(); // a keyboard goes on there
     this.button.setAttribute('aria-expanded', String(open));
     if (open) this.page.dataset.sheet = this.part.id;
     else delete this.page.dataset.sheet;
     this.changed(open);
+  }
+
+  /** Where the focus goes when the sheet closes: a button that lies in another sheet is not seen then. */
+  private get back(): HTMLElement {
+    return this.button.checkVisibility() ? this.button : (this.before ?? this.button);
   }
 
   private closeOther(): void {
@@ -67,7 +75,7 @@ export class Disclosure {
   }
 
   private key(event: KeyboardEvent): void {
-    if (event.key !== 'Escape' || !this.isOpen) return;
+    if (!isFor('escape', event) || !this.isOpen) return;
     event.stopPropagation(); // otherwise it silences the avatar
     this.close();
   }

@@ -85,7 +85,9 @@ export class Panel {
       term.append(this.worded('span', name));
       if (ABOUT[name]) term.append(this.worded('small', ABOUT[name]));
       cell = document.createElement('dd');
-      this.list.append(term, cell);
+      const row = document.createElement('div');
+      row.append(term, cell);
+      this.list.append(row);
       this.rows.set(name, cell);
     }
     this.words.write(cell, value);

@@ -24,12 +24,25 @@ export class ServiceSheet {
     this.sheet.hidden = offers.length === 0;
     const serves = (offer: Offer) => services[offer.kind].name === offer.name;
     const [here, missing] = split(offers, (offer) => offer.hindrance === '' || serves(offer));
-    const choices = KINDS.map((kind) => {
-      const group = this.named(document.createElement('fieldset'), document.createElement('legend'), kind);
-      group.append(...here.filter((offer) => offer.kind === kind).map((offer) => this.row(offer, serves(offer))));
-      return group;
+    const kinds = KINDS.map((kind) => {
+      const offered = here.filter((offer) => offer.kind === kind);
+      return offered.length === 1 && offered.every(serves) ? this.only(offered[0]!) : this.choice(kind, offered, serves);
     });
-    this.sheet.replaceChildren(...choices, ...(missing.length > 0 ? [this.others(missing)] : []));
+    this.sheet.replaceChildren(...kinds, ...(missing.length > 0 ? [this.others(missing)] : []));
+  }
+
+  /** A service beside which there is none of its kind to choose. */
+  private only(offer: Offer): HTMLElement {
+    const row = this.named(document.createElement('div'), document.createElement('span'), offer.kind);
+    row.className = 'row';
+    row.append(this.told(document.createElement('span'), offer));
+    return row;
+  }
+
+  private choice(kind: Offer['kind'], offers: readonly Offer[], serves: (offer: Offer) => boolean): HTMLFieldSetElement {
+    const group = this.named(document.createElement('fieldset'), document.createElement('legend'), kind);
+    group.append(...offers.map((offer) => this.row(offer, serves(offer))));
+    return group;
   }
 
   /** What cannot be chosen, and what it needs. */

@@ -7,7 +7,7 @@ import { Disclosure } from './disclosure.ts';
 import { keepUp, type TalkStore } from './kept-talk.ts';
 import { byId } from '../elements.ts';
 import { icon } from '../icons.ts';
-import { isForOthers } from '../keyboard/keys.ts';
+import { isFor, isForOthers } from '../keyboard/keys.ts';
 
 const TOLD = 4000; // ms for which it says what a button has done
 const END = 40; // pixels from the lower end within which the record follows what is said
@@ -55,7 +55,7 @@ export class Transcript {
     byId(page, 'drawer-save').onclick = () => saveText(this.text(), this.fileName());
     words.onChange(() => this.draw(), signal);
     const drawer = new Disclosure(page, 'drawer', signal, (open) => this.opened(open));
-    const press = (event: KeyboardEvent) => event.key.toLowerCase() === 't' && !isForOthers(event) && drawer.toggle();
+    const press = (event: KeyboardEvent) => isFor('transcript', event) && !isForOthers(event) && drawer.toggle();
     page.addEventListener('keydown', press, { signal });
     this.draw();
   }
