@@ -130,6 +130,7 @@ export class Visit {
     atEnd(signal, () => stage.dispose());
     let offered = () => {}; // says anew what headsets may do
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
+    stage.onSeen = () => (root.dataset.there = '');
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, stage.keepClear.bind(stage));
     const home = server.home();
