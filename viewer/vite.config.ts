@@ -2,6 +2,7 @@ import { defineConfig } from 'vitest/config';
 import { compressed } from './compression.ts';
 import { preloaded } from './preloading.ts';
 import { PATIENCE } from './support/patience.ts';
+import { themed } from './theming.ts';
 import { webAssembly } from './webassembly.ts';
 
 // `npm run dev` shows the page against a running `ico3d serve … --port 8700`.
@@ -9,7 +10,7 @@ const SERVER = process.env.ICO3D_SERVER ?? 'http://127.0.0.1:8700';
 
 export default defineConfig({
   base: './',
-  plugins: [webAssembly(), compressed(), preloaded('index.html', 'theatre')],
+  plugins: [webAssembly(), compressed(), preloaded('index.html', 'theatre'), themed({ 'index.html': 'body', 'check.html': 'documentElement', 'studio.html': 'documentElement' })],
   worker: { format: 'es', plugins: () => [webAssembly()] },
   build: {
     outDir: '../src/ico3d/chat/static',

@@ -4,6 +4,7 @@ import { Browser } from '../support/browser/browser.ts';
 import { drawSeldom, hideBody, refreshed } from '../support/browser/drawing.ts';
 import { seeChin, seeEyes } from '../support/browser/eyes.ts';
 import { drawnBy } from '../support/browser/path.ts';
+import { keepCaptions } from '../support/browser/talk.ts';
 
 const MOST_SCRIPT = 1.2e6; // bytes on the wire until she is seen
 
@@ -74,7 +75,8 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     const assets = sent.filter(({ url }) => url.includes('/assets/')).map(({ bytes }) => bytes);
     expect(new Set(assets)).toEqual(new Set([0]));
     expect(sent.find(({ url }) => url === drawnBy('webgl', demoUrl!))!.bytes).toBeGreaterThan(0);
-    await page.waitForFunction(() => document.body.dataset.state === 'idle'); // captions stay from now on
+    await page.waitForFunction(() => document.body.dataset.state === 'idle');
+    await keepCaptions(page);
   });
 
   test.each([

@@ -130,6 +130,7 @@ export class Visit {
     atEnd(signal, () => stage.dispose());
     let offered = () => {}; // says anew what headsets may do
     stage.onGone = () => void this.goOnWithoutWebGL(stage).then(() => offered());
+    stage.onSeen = () => (root.dataset.there = '');
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, stage.keepClear.bind(stage));
     const home = server.home();
@@ -142,7 +143,8 @@ export class Visit {
       makeThemeButton(root, words, (light) => stage.setBright(light), signal),
       theatre.makeViewBar(stage.orbit, words, root, signal),
     );
-    const xr = { stage, conversation, head: presence.head, root, words, settings: this.ports.xr ?? xrSettings(() => null), signal };
+    const settings = this.ports.xr ?? xrSettings(() => null);
+    const xr = { stage, conversation, head: presence.head, root, words, settings, begin: () => this.overlay.accept('voice'), signal };
     offered = offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
     offerDrawing(root, wish, (wish) => void this.redraw(stage, wish).then(offered));
     const { playback } = presence;
@@ -248,9 +250,14 @@ export class Visit {
   private async mayTalk(conversation: Conversation): Promise<void> {
     const { context } = conversation.player;
     const allowed = context.state === 'running';
-    const choice = allowed ? this.ports.choice : await this.overlay.choose();
+    const choice = allowed ? this.ports.choice : await this.overlay.choose(this.aroundHer());
     if (!allowed) await context.resume();
     if (choice === 'voice') void conversation.toggleMicrophone();
+  }
+
+  /** The picture, and the buttons at its edge that need no talk. */
+  private aroundHer(): HTMLElement[] {
+    return [byId(this.root, 'stage'), this.root.querySelector('header')!];
   }
 
   private fail(error: unknown): void {

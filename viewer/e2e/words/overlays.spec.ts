@@ -5,6 +5,7 @@ import { Browser } from '../../support/browser/browser.ts';
 import { refreshed } from '../../support/browser/drawing.ts';
 import { overHead } from '../../support/browser/head.ts';
 import { drawnBy } from '../../support/browser/path.ts';
+import { keepCaptions } from '../../support/browser/talk.ts';
 import { VIEWS } from '../../src/stage/camera/framing.ts';
 import type { ConversationView } from '../../src/talk/conversation.ts';
 import texts from '../../src/words/texts.json' with { type: 'json' };
@@ -43,6 +44,7 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
     await browser.open(drawnBy('soft', demoUrl!));
     await page.waitForSelector('#captions:visible');
     await page.waitForFunction(() => document.body.dataset.state === 'idle' && !window.ico3d!.conversation!.player.heard());
+    await keepCaptions(page);
     await page.evaluate((text) => {
       document.getElementById('question')!.textContent = text.slice(0, 60);
       document.querySelector('#answer span')!.textContent = text;

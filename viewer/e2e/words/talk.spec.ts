@@ -2,7 +2,7 @@ import { readFileSync } from 'node:fs';
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
-import { finished, openPage, SENTENCE, SHORTER, until } from '../../support/browser/talk.ts';
+import { finished, keepCaptions, openPage, SENTENCE, SHORTER, until } from '../../support/browser/talk.ts';
 import { slowness } from '../../support/slowness.ts';
 
 const { talkingUrl } = inject('shared');
@@ -31,6 +31,7 @@ beforeAll(async () => {
   await pauseDrawing(browser.page);
   await browser.context.grantPermissions(['clipboard-read', 'clipboard-write']);
   await until(browser, finished(0)); // the greeting
+  await keepCaptions(browser.page);
 });
 afterAll(() => browser?.close());
 

@@ -41,6 +41,7 @@ export function fillPage({ page: holder, words }: Shell, server: URL | null): vo
   holder.replaceChildren(...new DOMParser().parseFromString(html, 'text/html').body.children);
   delete holder.dataset.state;
   delete holder.dataset.drawer;
+  delete holder.dataset.there;
   delete holder.dataset.sheet;
   words.translate();
   for (const link of holder.querySelectorAll<HTMLAnchorElement>('a[href]')) link.href = server ? new URL(link.getAttribute('href')!, server).href : '';

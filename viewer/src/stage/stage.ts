@@ -36,6 +36,8 @@ export class Stage {
   meeting: Meeting | null = null;
   frames = 0; // drawn so far
   bytes = 0; // of the bundle that came before there was somebody to see
+  /** Called once, when the first picture is seen. */
+  onSeen: () => void = () => {};
   /** Called when the browser takes the picture away and does not give it back. */
   onGone: () => void = () => {};
   private readonly quality = new Quality(ladder({ backdrop: false, gaussians: false }));
@@ -78,6 +80,7 @@ export class Stage {
     };
     const easel = { canvas, scene: this.scene, background: manifest.background, backcloth: this.scenery, transparent };
     this.painting = new Painting(easel, ports, drawing);
+    canvas.style.visibility = 'hidden'; // many browsers show black where nothing was drawn yet
     const body = groundOf(manifest);
     if (body) this.meeting = meetingOfBody(body.ground, body.height);
     this.arrange();
@@ -291,7 +294,14 @@ export class Stage {
     const before = performance.now();
     this.painter.paint(this.scene, this.camera, this.presentation !== null);
     this.drawing.add(this.painter.drawTook ?? performance.now() - before);
-    this.frames++;
+    if (this.frames++ === 0) void this.unveil();
+  }
+
+  /** Shows the canvas with its first picture. */
+  private async unveil(): Promise<void> {
+    await this.painter.shown();
+    this.canvas.style.visibility = '';
+    this.onSeen();
   }
 
   private see(seen: boolean): void {

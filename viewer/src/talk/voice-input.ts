@@ -1,8 +1,9 @@
 import { Microphone } from '../audio/microphone.ts';
+import { watchBlocked } from '../audio/permission.ts';
 import { sentenceOf } from '../errors.ts';
 import type { Heard } from '../face/face.ts';
 import { MICROPHONE_RATE, type ClientMessage, type WelcomeMessage } from '../protocol.ts';
-import { say, type Sentence } from '../words/text.ts';
+import { codeOf, say, type Sentence } from '../words/text.ts';
 import { VoiceMeter } from './latency.ts';
 import { Listening, type ListeningView } from './listening.ts';
 import { Recovery } from './recovery.ts';
@@ -14,10 +15,12 @@ const SILENCE = { pieces: 10, milliseconds: 100 }; // that is told when the micr
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 export type MicrophoneState = 'closed' | 'opening' | 'open';
+/** As the page shows it: closed, and blocked for the page. */
+export type ShownMicrophone = MicrophoneState | 'blocked';
 
 /** What the page shows of the visitor's voice. */
 export interface VoiceView extends ListeningView {
-  microphone(state: MicrophoneState): void;
+  microphone(state: ShownMicrophone): void;
   talking(held: boolean): void;
 }
 
@@ -37,6 +40,7 @@ export class VoiceInput {
   private ended = false; // the session is: nothing opens
   private sample = 0; // since the microphone opened
   private state: MicrophoneState = 'closed'; // open: what it hears is sent
+  private blocked = false; // the microphone, for this page
   private held = false; // the button to talk is
   private talking = false; // and the server was told
   private letGo = 0; // when it was, ms on the performance clock
@@ -64,6 +68,7 @@ export class VoiceInput {
       },
     );
     this.recovery = new Recovery({ isOpen: () => this.state === 'open', reopen: () => this.reopen() }, signal);
+    void watchBlocked((blocked) => this.block(blocked), signal);
   }
 
   /** When the visitor last spoke, ms on the performance clock. */
@@ -153,9 +158,12 @@ export class VoiceInput {
     try {
       const open = await this.microphone.start();
       if (open) void this.recovery.opened();
+      if (open) this.block(false);
       return open;
     } catch (error) {
-      notice(sentenceOf(error));
+      const sentence = sentenceOf(error);
+      if (codeOf(sentence) === 'microphone.blocked') this.block(true);
+      notice(sentence);
       return false;
     }
   }
@@ -189,8 +197,14 @@ export class VoiceInput {
 
   private show(state: MicrophoneState): void {
     this.state = state;
-    this.view.microphone(state);
+    this.view.microphone(state === 'closed' && this.blocked ? 'blocked' : state);
     this.onChange();
+  }
+
+  private block(blocked: boolean): void {
+    if (blocked === this.blocked) return;
+    this.blocked = blocked;
+    if (this.state === 'closed') this.show('closed');
   }
 
   /**

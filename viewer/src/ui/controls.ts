@@ -1,6 +1,6 @@
 import { rememberedInTab, rememberInTab } from '../remembered.ts';
 import type { Conversation } from '../talk/conversation.ts';
-import type { MicrophoneState } from '../talk/voice-input.ts';
+import type { ShownMicrophone } from '../talk/voice-input.ts';
 import { foreignTo } from '../words/foreign.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence, type Tongue } from '../words/text.ts';
@@ -23,7 +23,7 @@ export class Controls {
   private readonly stop: HTMLButtonElement;
   private readonly mute: HTMLButtonElement;
   private readonly send: HTMLButtonElement;
-  private opened: MicrophoneState = 'closed';
+  private opened: ShownMicrophone = 'closed';
   private connected = true;
 
   /**
@@ -41,11 +41,11 @@ export class Controls {
     this.talk = byId(root, 'talk');
     this.stop = byId(root, 'stop');
     this.mute = byId(root, 'mute');
-    this.microphone.append(icon('microphone'));
     this.talk.append(icon('radio'));
     this.stop.prepend(icon('stop'));
     this.send = byId(root, 'send');
     this.send.append(icon('send'));
+    this.showMicrophone();
     markTyping(this.form, this.input, signal);
     const ask = () => words.write(this.input, askIn(foreignTo(words.language, languages)), 'placeholder');
     words.onChange(ask, signal);
@@ -142,7 +142,7 @@ export class Controls {
     this.talk.setAttribute('aria-pressed', String(held));
   }
 
-  setMicrophone(state: MicrophoneState): void {
+  setMicrophone(state: ShownMicrophone): void {
     this.opened = state;
     this.showMicrophone();
   }
@@ -155,7 +155,11 @@ export class Controls {
   }
 
   private showMicrophone(): void {
-    const state = this.connected || this.opened === 'closed' ? this.opened : 'waiting';
+    const { opened } = this;
+    const state = this.connected || opened === 'closed' || opened === 'blocked' ? opened : 'waiting';
+    const blocked = state === 'blocked';
+    this.microphone.replaceChildren(icon(blocked ? 'blocked' : 'microphone'));
+    this.words.write(this.microphone, say(blocked ? 'microphone.denied' : 'microphone'), 'label');
     this.microphone.setAttribute('aria-pressed', String(state === 'open'));
     this.microphone.setAttribute('aria-busy', String(state === 'opening' || state === 'waiting'));
     this.words.write(this.microphone, say(`microphone.${state}`), 'title');

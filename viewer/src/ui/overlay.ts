@@ -25,6 +25,7 @@ export class Overlay {
   private readonly words: PageWords;
   private readonly reload: () => void;
   private readonly signal: AbortSignal;
+  private accepted: (choice: Choice) => void = () => {};
   private queued = false;
   private counting: ReturnType<typeof setTimeout> | undefined;
 
@@ -79,16 +80,31 @@ export class Overlay {
     this.words.write(this.bar, sentence, 'valuetext');
   }
 
-  /** Resolves when the visitor chooses; browsers play sound only after such a click. */
-  choose(): Promise<Choice> {
+  /**
+   * Resolves when the visitor chooses; browsers play sound only after such a click.
+   *
+   * @param usable what of the page may be used meanwhile
+   */
+  choose(usable: readonly HTMLElement[] = []): Promise<Choice> {
     this.bar.hidden = this.coming.hidden = true;
     byId(this.root, 'choices').hidden = false;
     const start = byId<HTMLButtonElement>(this.root, 'start');
+    start.onclick = () => this.accept('voice');
+    byId(this.root, 'start-typing').onclick = () => this.accept('typing');
+    for (const element of usable) element.inert = false;
+    this.page.addEventListener('mousedown', (event) => this.keepFocus(event), { signal: this.signal });
     focusOn(start);
-    return new Promise((resolve) => {
-      start.onclick = () => resolve('voice');
-      byId(this.root, 'start-typing').onclick = () => resolve('typing');
-    });
+    return new Promise((resolve) => (this.accepted = resolve));
+  }
+
+  /** The visitor has chosen, by whatever was clicked. */
+  accept(choice: Choice): void {
+    this.accepted(choice);
+  }
+
+  /** Until the talk begins, a click on the picture leaves the focus where it is: mostly at the button that begins it. */
+  private keepFocus(event: MouseEvent): void {
+    if (this.isShown && !(event.target as Element).closest('header, button, a, form')) event.preventDefault();
   }
 
   get isShown(): boolean {

@@ -1,9 +1,9 @@
-import type { Offer, Services } from '../protocol.ts';
+import type { Offer } from '../protocol.ts';
 import type { Figures } from '../stage/figures.ts';
 import type { Conversation, ConversationView } from '../talk/conversation.ts';
 import type { PageWords } from '../words/page-words.ts';
 import { say, type Sentence } from '../words/text.ts';
-import { Captions } from './captions.ts';
+import { Captions } from './captions/captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
 import { LineNotice } from './line.ts';
@@ -15,6 +15,7 @@ import { Panel } from './sheets/panel.ts';
 import { Settings } from './sheets/settings.ts';
 import { ServiceSheet } from './sheets/sheet.ts';
 import { Transcript, type Talker } from './sheets/transcript.ts';
+import { StandIns } from './stand-ins.ts';
 
 const NOTICE_TIME = 9000; // ms
 
@@ -45,7 +46,8 @@ export function makePage(
   const line = new LineNotice(root, words, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);
-  new Help(root, words, () => overlay.isShown, signal);
+  new Help(root, words, signal);
+  const standIns = new StandIns(root, words);
   const memory = new Memory(root, words, talker.home);
   const transcript = new Transcript(root, words, talker, () => captions.clear(), signal);
   let choose: (offer: Offer) => void = () => {};
@@ -63,6 +65,7 @@ export function makePage(
       root.dataset.state = now = state;
       tellState();
       controls.setSpeaking(state === 'speaking');
+      captions.rest(state === 'idle');
       if (state === 'connecting') overlay.reconnect();
       announce();
     },
@@ -71,6 +74,7 @@ export function makePage(
       if (!final) return;
       transcript.record.asked(text);
       memory.said(text);
+      standIns.ask();
     },
     answer: () => {}, // it is shown as it is heard
     heard(progress) {
@@ -80,10 +84,11 @@ export function makePage(
     over(utterance, interrupted) {
       transcript.record.over(utterance, interrupted);
       captions.over(utterance, transcript.record.answered);
+      if (!interrupted) standIns.over();
       announce();
     },
     services(services, offers) {
-      showStandIns(root, words, services, offers.length > 0);
+      standIns.show(services, offers.length > 0);
       sheet.show(services, offers);
     },
     memory(offered, tell) {
@@ -129,19 +134,6 @@ export function makePage(
     conversation.start();
   };
   return { view, talk };
-}
-
-/**
- * Says plainly which services are the small offline ones.
- *
- * @param choice whether the settings offer others
- */
-function showStandIns(root: ParentNode, words: PageWords, services: Services, choice: boolean): void {
-  const simple = (['recognition', 'language', 'voice'] as const).filter((kind) => services[kind].stand_in);
-  const names = simple.map((kind) => say(`stand-ins.${kind}`));
-  const note = byId(root, 'stand-ins');
-  note.hidden = names.length === 0;
-  words.write(note, say(choice ? 'stand-ins' : 'stand-ins-only', { names }));
 }
 
 /** Shows a sentence for some seconds; one that is there already stays as it is: many would cover the face. */

@@ -71,6 +71,7 @@ function makeReason({ words }: XrPorts): HTMLElement {
 
 async function enter(mode: XrMode, ports: XrPorts): Promise<void> {
   if (!isPossible(ports)) throw new PageError(say('xr.soft'));
+  ports.begin();
   const { Immersion } = await import('./immersion.ts');
   await Immersion.begin(mode, ports);
 }

@@ -15,6 +15,8 @@ export interface XrPorts {
   root: ParentNode; // of the page, whose captions and notices are shown in space, too
   words: PageWords;
   settings: XrSettings;
+  /** Begins the talk where none has begun: who enters has clicked, and reaches no other button then. */
+  begin(): void;
   /** Ends the visit. */
   signal: AbortSignal;
 }

@@ -71,3 +71,14 @@ export function keepSound(page: Page): Promise<unknown> {
     Object.defineProperty(AudioContext.prototype, 'state', { configurable: true, get });
   });
 }
+
+/** Captions stay from now on, also after an answer: what they cover is measured in peace. */
+export function keepCaptions(page: Page): Promise<void> {
+  return page.evaluate(() => {
+    const captions = document.getElementById('captions')!;
+    captions.hidden = false;
+    captions.classList.remove('gone');
+    captions.classList.add = () => {};
+    Object.defineProperty(captions, 'hidden', { get: () => false, set: () => {} });
+  });
+}

@@ -30,6 +30,8 @@ export class ScriptedAudio {
   });
   /** How often the screen was kept on, and whether it is. */
   readonly wake = { asked: 0, held: false };
+  /** What the browser says of the page's permission; a test changes it, and tells so. */
+  readonly permission = Object.assign(new EventTarget(), { state: 'prompt' });
   readonly page = Object.assign(new EventTarget(), { visibilityState: 'visible' });
 
   /** What stands for the browser's own classes, `navigator` and `document`. */
@@ -38,7 +40,7 @@ export class ScriptedAudio {
   constructor() {
     const audio = this;
     this.globals = {
-      navigator: { mediaDevices: this.devices, wakeLock: { request: async () => this.lock() } },
+      navigator: { mediaDevices: this.devices, permissions: { query: async () => this.permission }, wakeLock: { request: async () => this.lock() } },
       document: this.page,
       AudioContext: class extends ScriptedContext {
         constructor(options?: object) {

@@ -89,7 +89,8 @@ describe.each(STEPS)('when it fails at: %s', (step) => {
     await pass(10_000);
     expect([audio.records, audio.running]).toEqual([false, 0]);
     expect(notices).toEqual([expect.stringMatching(/^[A-Z].*type instead\.$/)]);
-    expect(shown).toEqual(way === 'toggle' ? ['opening', 'closed'] : []);
+    const closed = step === 'permission' ? ['blocked'] : way === 'toggle' ? ['closed'] : [];
+    expect(shown).toEqual([...(way === 'toggle' ? ['opening'] : []), ...closed]);
     expect(talking).toBe(false);
     conversation.release();
     expect([...ScriptedSocket.last.of('talk'), ...ScriptedSocket.last.of('audio')]).toEqual([]);
@@ -113,7 +114,34 @@ test.each([
   audio.prompts[0]!.deny(name);
   await pass();
   expect(notices).toEqual([sentence]);
+  expect(shown.at(-1)).toBe(name === 'NotAllowedError' ? 'blocked' : 'closed');
+});
+
+test('a microphone that is blocked is shown so until it is allowed', async () => {
+  const permit = (state: string) => {
+    audio.permission.state = state;
+    audio.permission.dispatchEvent(new Event('change'));
+  };
+  void conversation.toggleMicrophone();
+  audio.prompts[0]!.deny('NotAllowedError');
+  await pass(60_000); // its sentence has gone meanwhile
+  expect(shown).toEqual(['opening', 'blocked']);
+  permit('granted');
   expect(shown.at(-1)).toBe('closed');
+  permit('denied');
+  expect(shown.at(-1)).toBe('blocked');
+  await open(); // some systems block it themselves, and tell nobody when they allow it
+  expect(shown.at(-1)).toBe('open');
+  await conversation.toggleMicrophone();
+  expect(shown.at(-1)).toBe('closed');
+});
+
+test('the button to talk tells of a blocked microphone, too', async () => {
+  void conversation.press();
+  audio.prompts[0]!.deny('NotAllowedError');
+  await pass();
+  conversation.release();
+  expect(shown.at(-1)).toBe('blocked');
 });
 
 test('clicks while the browser asks neither ask again nor leave a second stream', async () => {

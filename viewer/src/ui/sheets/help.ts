@@ -50,14 +50,14 @@ export class Help {
   private readonly page: HTMLElement;
   private readonly words: PageWords;
 
-  /** @param isCovered whether something lies over the page, so that nobody would see the help */
-  constructor(page: HTMLElement, words: PageWords, isCovered: () => boolean, signal: AbortSignal) {
+  constructor(page: HTMLElement, words: PageWords, signal: AbortSignal) {
     this.page = page;
     this.words = words;
     const sheet = new Disclosure(page, 'help', signal, (open) => open && this.opened());
-    words.write(byId(page, 'help-button'), say('keyed', { name: say('help'), key: KEYS.help[0] }), 'title');
+    const button = byId(page, 'help-button');
+    words.write(button, say('keyed', { name: say('help'), key: KEYS.help[0] }), 'title');
     const press = (event: KeyboardEvent) => {
-      if (!isFor('help', event) || isForTexts(event) || isCovered()) return;
+      if (!isFor('help', event) || isForTexts(event) || button.closest('[inert]')) return; // where something covers the page nobody would see it
       event.preventDefault();
       sheet.toggle();
     };

@@ -55,7 +55,7 @@ export class Transcript {
     byId(page, 'drawer-save').onclick = () => saveText(this.text(), this.fileName());
     words.onChange(() => this.draw(), signal);
     const drawer = new Disclosure(page, 'drawer', signal, (open) => this.opened(open));
-    const press = (event: KeyboardEvent) => isFor('transcript', event) && !isForOthers(event) && drawer.toggle();
+    const press = (event: KeyboardEvent) => isFor('transcript', event) && this.isOffered && !isForOthers(event) && drawer.toggle();
     page.addEventListener('keydown', press, { signal });
     this.draw();
   }
@@ -65,6 +65,10 @@ export class Transcript {
     const button = byId(this.page, 'drawer-button');
     button.append(icon('record'));
     button.hidden = false;
+  }
+
+  private get isOffered(): boolean {
+    return !byId(this.page, 'drawer-button').hidden;
   }
 
   heard(progress: Progress): void {

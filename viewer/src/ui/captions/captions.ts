@@ -1,7 +1,11 @@
-import { atEnd } from '../lifetime.ts';
-import type { Progress } from '../talk/captioning.ts';
-import { RunningSentence } from '../talk/record.ts';
-import { byId } from './elements.ts';
+import { atEnd } from '../../lifetime.ts';
+import { estimated, type Progress } from '../../talk/captioning.ts';
+import { RunningSentence } from '../../talk/record.ts';
+import { byId } from '../elements.ts';
+import { Leaving } from './leaving.ts';
+
+const LEAST = 8000; // ms for which nobody speaks until what was said goes
+const READING = 0.5; // of the time in which it is said
 
 /** What the visitor asked and the sentence that the avatar says, word by word as it is heard; then all that was said. */
 export class Captions {
@@ -12,7 +16,9 @@ export class Captions {
   private readonly heardWords = document.createElement('span');
   private readonly nextWords = document.createElement('span'); // keep their place, so that no line jumps
   private readonly sentence = new RunningSentence();
+  private readonly leaving: Leaving;
   private utterance: number | null = null; // that is heard
+  private quiet = false; // nobody listens, thinks or speaks
 
   /**
    * @param lang language of the talk; empty if it is unknown
@@ -24,6 +30,7 @@ export class Captions {
     this.answered = byId(root, 'answer');
     this.cut = byId(root, 'cut');
     this.root.lang = lang;
+    this.leaving = new Leaving(this.root, signal);
     this.nextWords.className = 'unheard';
     this.answered.append(this.heardWords, this.nextWords);
     const observer = new ResizeObserver(() => this.scroll()); // lines break anew: a phone was turned
@@ -36,6 +43,7 @@ export class Captions {
     this.asked.textContent = text;
     this.asked.classList.toggle('partial', !final);
     if (final || this.utterance === null) this.write('', ''); // what is asked now is not what was answered
+    this.settle();
   }
 
   heard(progress: Progress): void {
@@ -43,6 +51,7 @@ export class Captions {
     this.utterance = progress.utterance;
     this.root.hidden = false;
     this.write(text.slice(0, heard), text.slice(heard));
+    this.settle();
   }
 
   /**
@@ -54,6 +63,13 @@ export class Captions {
     if (utterance !== this.utterance) return;
     this.utterance = null;
     this.write(said, '');
+    this.settle();
+  }
+
+  /** @param quiet nobody listens, thinks or speaks: what was said goes once it could be read */
+  rest(quiet: boolean): void {
+    this.quiet = quiet;
+    this.settle();
   }
 
   /** Nothing is said any more: what was said belongs to another talk. */
@@ -62,6 +78,12 @@ export class Captions {
     this.asked.textContent = '';
     this.write('', '');
     this.root.hidden = true;
+  }
+
+  private settle(): void {
+    const { quiet, utterance, leaving } = this;
+    if (quiet && utterance === null) leaving.after(timeToRead(this.heardWords.textContent!));
+    else leaving.stay();
   }
 
   private write(heard: string, next: string): void {
@@ -84,4 +106,10 @@ export class Captions {
     answered.scrollTop = Math.floor(down / page) * page;
     cut.hidden = answered.scrollTop < 1;
   }
+}
+
+/** ms for which a text stays after it was said: long ones longer, as they are not read in a glance. */
+export function timeToRead(text: string): number {
+  const spoken = estimated(text, 0).at(-1)?.time ?? 0;
+  return Math.max(LEAST, 1000 * READING * spoken);
 }
