@@ -12,6 +12,7 @@ from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.baking import body_cost, head_cost
 from ico3d.avatar.baking.body_bundle import BodyParts, seen_box
 from ico3d.avatar.baking.importance import gaussian_importance
+from ico3d.avatar.baking.skinned.hands import evened
 from ico3d.avatar.baking.skinned.quantised import Clip, quantised
 from ico3d.avatar.clip_views import recorded_views
 from ico3d.avatar.moving import MOMENTS
@@ -96,7 +97,8 @@ def bake(
     pair = body_cost.window_pair(body, 0, partial(SkinnedBody(baked).window_gaussians, 0), head)
     probes = body_cost.probe_views(ring, span)
     loss = body_cost.measure(*pair, recorded, probes)
-    return SkinnedResult(baked, baked.to_bytes(), loss, cuts)
+    shown = evened(baked)  # not before: the loss is that of fewer bits
+    return SkinnedResult(shown, shown.to_bytes(), loss, cuts)
 
 
 def check(result: SkinnedResult) -> None:
