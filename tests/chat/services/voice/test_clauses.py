@@ -161,7 +161,7 @@ def test_the_voice_itself_reads_numbers():
     assert symbols == "θɹˈiːpɔɪntfˈaɪv"
 
 
-@pytest.mark.parametrize("blank", [" ", "_", "- "])
+@pytest.mark.parametrize("blank", [" ", "_", "- ", "、", "，", ", ", "\u0e31 ", "、」"])
 async def test_an_answer_of_blanks_holds_nobody_up(blank):
     clauses, answer = Clauses(), (blank * 4000)[:4000]
     begun = time.process_time()

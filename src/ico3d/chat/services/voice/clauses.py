@@ -47,6 +47,7 @@ class Clauses(SimpleTextAggregator):
         """Sets the language of the answers, a code such as `de`; by default English."""
         super().__init__(language=language)
         self._first = True
+        self._marks = self._spaces = 0  # up to where they were looked at: none is twice
 
     @property
     def _rest(self) -> str:
@@ -60,6 +61,7 @@ class Clauses(SimpleTextAggregator):
     async def begin(self) -> None:
         """Starts a new answer."""
         await self.reset()
+        self._marks = self._spaces = 0
         self._first = True
 
     async def aggregate(self, text: str) -> AsyncIterator[Aggregation]:
@@ -91,6 +93,7 @@ class Clauses(SimpleTextAggregator):
             return None
         sentence = await sentence_end(self, char)
         if sentence is not None:
+            self._marks = self._spaces = 0
             return await self._with_trailing(text)
         end = self._clause_end(char) if self._first else 0
         end = end or self._unmarked_end()
@@ -116,7 +119,8 @@ class Clauses(SimpleTextAggregator):
         """Where the first clause ends; 0 if it is not complete. It is when something follows."""
         if char.isspace() or char in SENTENCE_ENDING_PUNCTUATION or re.fullmatch(_CLOSER, char):
             return 0
-        for mark in _CLAUSE.finditer(self._rest[:-1]):
+        for mark in _CLAUSE.finditer(self._rest[:-1], self._marks):
+            self._marks = mark.end()
             if _is_long_enough(self._rest[: mark.end()]):
                 return mark.end()
         words = list(re.finditer(r"\S+", self._rest[:-1]))
@@ -126,7 +130,8 @@ class Clauses(SimpleTextAggregator):
     def _unmarked_end(self) -> int:
         """Where a sentence ends whose script marks ends by spaces; 0 if it does not yet."""
         least = LEAST_LETTERS if self._first else UNMARKED_LETTERS
-        for space in _UNMARKED.finditer(self._rest[:-1]):
+        for space in _UNMARKED.finditer(self._rest[:-1], self._spaces):
+            self._spaces = space.end()
             if _letters(self._rest[: space.start()]) >= least:
                 return space.start()
         return 0
@@ -139,6 +144,7 @@ class Clauses(SimpleTextAggregator):
     async def _restart(self, text: str) -> None:
         """Forgets what it was waiting for."""
         await self.reset()
+        self._marks = self._spaces = 0
         self._rest = text
 
 
