@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ico3d.avatar.animation import keyframes
 from ico3d.avatar.animation.keyframes import Motion, find_actions, find_animation, find_rest
 from ico3d.bundle.animation import Rest
 from ico3d.splat.gaussians import Gaussians
@@ -118,3 +119,13 @@ def test_the_shortest_clips_have_a_rest(count):
     motion = Motion(15.0, np.arange(1.0, count + 1), places)
     animation = find_animation(motion)
     assert animation.rest == Rest(0, count - 1) and animation.actions == ()
+
+
+def test_of_a_long_clip_no_more_places_are_kept_than_are_needed(motion, monkeypatch):
+    all_places = sum(len(places) for places in motion.places)
+    monkeypatch.setattr(keyframes, "MOST_PLACES", all_places // 3)
+    fewer = Motion.of(Gesturing())
+    assert sum(len(places) for places in fewer.places) <= all_places // 3
+    found, before = find_animation(fewer), find_animation(motion)
+    assert found.rest == before.rest
+    assert {action.frame for action in found.actions} == {action.frame for action in before.actions}

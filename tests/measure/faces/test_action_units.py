@@ -65,6 +65,7 @@ def test_frames_without_a_face_in_either_table_do_not_count(tmp_path):
         ("frame, success\n1, 1\n", "no column AU10_r"),
         (", ".join(f"{unit}_r" for unit in UNITS) + "\n" + "x, " * 16 + "y\n", "17 numbers"),
         (", ".join(f"{unit}_r" for unit in UNITS) + "\n", "no rows of 17 numbers"),
+        ("1" * 200_000, "field larger than field limit"),
     ],
 )
 def test_what_is_no_table_is_one_sentence(tmp_path, contents, says):

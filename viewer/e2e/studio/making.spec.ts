@@ -61,10 +61,8 @@ test('build and clothes of a body are chosen in pictures, kept, and said to be m
   await page.check('#bodies [value=wine]');
   await expect.poll(bodyOf).toEqual({ wanted: true, build: 'sturdy', outfit: 'wine' });
   expect(await page.textContent('#body-about')).toMatch(/^Your head and face are recorded\. The body below the neck is made/);
-  const pictures = await page.$$eval('#looks label', (labels) =>
-    labels.map((label) => getComputedStyle(label, '::before').backgroundPosition),
-  );
-  expect(pictures).toEqual(['100% 0%', '100% 50%', '100% 100%', '0% 100%', '50% 100%', '100% 100%']); // one sheet, outfits across
+  const pictures = () => page.$$eval('#looks label', (labels) => labels.map((label) => getComputedStyle(label, '::before').backgroundPosition));
+  await expect.poll(pictures).toEqual(['100% 0%', '100% 50%', '100% 100%', '0% 100%', '50% 100%', '100% 100%']); // one sheet, outfits across
   expect(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth)).toBeLessThanOrEqual(0);
   await judge(page, 'studio body');
   await page.reload();

@@ -1,11 +1,13 @@
 """AUE: the error of a face's action units, from two tables that OpenFace wrote."""
 
 import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ico3d.common.files import read_small
 from ico3d.errors import CaptureError
 
 LOWER = ("AU10", "AU12", "AU14", "AU15", "AU17", "AU20", "AU23", "AU25", "AU26")
@@ -56,9 +58,9 @@ def read_action_units(path: Path) -> ActionUnits:
         CaptureError: If the file cannot be read, lacks a unit, or has something that is no number.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file, skipinitialspace=True))
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_small(path).decode("utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text, newline=""), skipinitialspace=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CaptureError(f"{path} cannot be read as a table of OpenFace: {error}.") from None
     names = [name.strip() for name in rows[0]] if rows else []
     wanted = [f"{unit}_r" for unit in LOWER + UPPER]
