@@ -28,6 +28,8 @@ WORDS = {
     ),
 }
 """Title, sentence and link in each language of the page (`viewer/src/words/text.ts`)."""
+DEEPEST = 16
+"""Folders of an address from which the link leads back."""
 PAGE = """<!doctype html>
 <html lang="{language}">
 <meta charset="utf-8">
@@ -54,8 +56,9 @@ a {{ padding: .6rem; color: var(--accent) }}
 """
 
 
-async def tell_missing(request: Request, error: HTTPException) -> Response:
+async def tell_missing(request: Request, error: Exception) -> Response:
     """The answer to an address at which nothing is, in the form that was asked for."""
+    assert isinstance(error, HTTPException)
     if wants_page(request.headers.get("accept", "")):
         answer: Response = HTMLResponse(missing_page(request), error.status_code, error.headers)
     else:
@@ -74,7 +77,7 @@ def missing_page(request: Request) -> str:
     language = language_of(request.headers.get("accept-language", ""))
     title, sentence, link = (html.escape(words) for words in WORDS[language])
     # relative, as a proxy may have put the server in a folder
-    start = "../" * (request.scope["path"].count("/") - 1) or "./"
+    start = "../" * min(request.scope["path"].count("/") - 1, DEEPEST) or "./"
     return PAGE.format(language=language, title=title, sentence=sentence, link=link, start=start)
 
 
