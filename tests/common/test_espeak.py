@@ -3,6 +3,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -146,3 +147,15 @@ def test_a_fork_speaks_by_a_process_of_its_own():
         os._exit(0 if same else 1)
     assert os.waitpid(child, 0)[1] == 0
     np.testing.assert_array_equal(synthesize("One.").samples, before.samples)
+
+
+def test_a_process_that_ends_leaves_no_files_behind():
+    synthesize("One.")
+    folder = Path(process._folder)
+    assert folder.is_dir()
+    assert process._process is not None
+    (folder / "copy").write_bytes(b"of the library")
+    process._process.kill()
+    with pytest.raises(ServiceError):
+        synthesize("Two.")
+    assert not folder.exists()

@@ -80,6 +80,7 @@ class EspeakProcess:
     def __init__(self):
         """Starts no process yet; the first call does."""
         self._process: subprocess.Popen[bytes] | None = None
+        self._folder = ""  # where it keeps copies of the library, which it may leave behind
         self._lock = threading.Lock()
 
     def ask(self, request: Request) -> Answer:
@@ -91,9 +92,10 @@ class EspeakProcess:
         """
         with self._lock:
             if self._process is None:
+                self._folder = tempfile.mkdtemp(prefix="ico3d-")
                 self._process = subprocess.Popen(
                     # -P: nothing is imported from the folder in which somebody starts the server
-                    (sys.executable, "-P", "-m", __name__),
+                    (sys.executable, "-P", "-m", __name__, self._folder),
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                 )
@@ -121,6 +123,7 @@ class EspeakProcess:
             process.kill()
             process.wait()
             _close(process)
+            shutil.rmtree(self._folder, ignore_errors=True)
 
     def forget(self) -> None:
         """Leaves the process to whoever started it: it is that of a parent of this process."""
@@ -276,4 +279,5 @@ def serve(asked: BinaryIO, told: BinaryIO) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it ends it
+    tempfile.tempdir = sys.argv[1]
     serve(sys.stdin.buffer, sys.stdout.buffer)

@@ -49,7 +49,9 @@ def test_nothing_is_lost_and_no_portion_is_long(text):
         ("ness" * 33, " ".join(["ness" * 16] * 2 + ["ness"])),
         ("b" * 64, "b" * 64),
         ("你好" * 90, "你好" * 90),
-        ("x-" * 90, "x-" * 90),
+        ("s′" * 40, "s′" * 32 + " " + "s′" * 8),
+        ("'s?" * 22, "'s?" * 21 + "' " + "s?"),
+        ("x-" * 90, " ".join(["x-" * 32] * 2 + ["x-" * 26])),
     ],
 )
 def test_no_word_is_endless(text, parts):

@@ -9,16 +9,15 @@ MOST = 200
 
 
 _WORD = 64
-_ENDLESS = re.compile(
-    rf"([^\W\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff]|['’]){{{_WORD}}}(?=\S)"
-)
+_UNSPACED = r"\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff"
+_ENDLESS = re.compile(rf"[^\s{_UNSPACED}]{{{_WORD}}}(?=[^\s{_UNSPACED}])")
 
 
 def parted(text: str) -> str:
-    """A text whose words have at most 64 letters, about as many as the longest of German.
+    """A text whose words have at most 64 letters and marks, about as many as German's longest.
 
     espeak-ng, which Piper and Kokoro ask for phonemes, too, writes beyond a buffer where a word has
-    160 letters. Scripts that have no spaces are left as they are.
+    140 of them, such as `s'` again and again. Scripts that have no spaces are left as they are.
     """
     return _ENDLESS.sub(r"\g<0> ", text)
 
