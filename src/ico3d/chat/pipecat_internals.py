@@ -154,8 +154,17 @@ def set_aggregated(aggregator: Any, text: str) -> None:
 
 @touches(_AGGREGATOR, "_check_sentence_with_lookahead")
 async def sentence_end(aggregator: Any, char: str) -> Any:
-    """Pipecat's decision whether a sentence is complete, given the next character."""
-    return await aggregator._check_sentence_with_lookahead(char)
+    """Pipecat's decision whether a sentence is complete, given the next character.
+
+    Its rules are written in Rust and panic at some texts, such as an initial before a space that is
+    not ASCII; a panic is no `Exception`. Then the sentence goes on.
+    """
+    try:
+        return await aggregator._check_sentence_with_lookahead(char)
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        return None
 
 
 @touches(_TURN, "_audio_buffer")

@@ -161,6 +161,16 @@ def test_the_voice_itself_reads_numbers():
     assert symbols == "θɹˈiːpɔɪntfˈaɪv"
 
 
+@pytest.mark.parametrize("space", "\xa0\u2028\u3000\x85")
+async def test_a_text_at_which_the_rules_panic_is_said_all_the_same(space):
+    text = f"Ask X{space}. {space}He knows. Then ask me again"
+    clauses = Clauses("de")
+    pieces = [piece.text async for piece in clauses.aggregate(text)]
+    rest = await clauses.flush()
+    assert rest is not None
+    assert "".join("".join([*pieces, rest.text]).split()) == "".join(text.split())
+
+
 @pytest.mark.parametrize("blank", [" ", "_", "- ", "、", "，", ", ", "\u0e31 ", "、」"])
 async def test_an_answer_of_blanks_holds_nobody_up(blank):
     clauses, answer = Clauses(), (blank * 4000)[:4000]
