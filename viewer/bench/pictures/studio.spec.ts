@@ -45,6 +45,7 @@ test('studio', async () => {
   await page.waitForSelector('#talk:visible', { timeout: PATIENCE });
   await page.click('#talk');
   await page.waitForFunction(() => document.body.dataset.state === 'idle', undefined, { timeout: 120_000 });
+  await page.waitForTimeout(2000); // until nothing of the first screen is seen any more
   await album.shoot(page, 'the talk');
   await browser.close();
   await album.write('page/studio.jpg', 258);
