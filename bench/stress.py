@@ -19,7 +19,7 @@ import numpy as np
 import tyro
 
 from ico3d.cli import run_script
-from ico3d.common.espeak import Speech, synthesize
+from ico3d.common.espeak.speech import Speech, synthesize
 from ico3d.errors import SettingsError
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, loudness, smoothed, timed_words

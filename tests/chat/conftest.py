@@ -8,7 +8,7 @@ from loguru import logger
 logger.remove()  # before pipecat is imported: it logs its start
 
 from ico3d.bundle.format import Bundle  # noqa: E402
-from ico3d.common.espeak import synthesize  # noqa: E402
+from ico3d.common.espeak.speech import synthesize  # noqa: E402
 from support.bundles.random_body import write_random_body  # noqa: E402
 from support.bundles.random_bundle import write_random_bundle  # noqa: E402
 from support.bundles.random_whole import write_random_whole  # noqa: E402

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import soxr
 
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.common.sphinx import DecoderLostError, SphinxProcess
 
 pytestmark = pytest.mark.slow

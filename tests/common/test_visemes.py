@@ -1,6 +1,6 @@
 import pytest
 
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.common.visemes import VISEMES, visemes
 
 

@@ -29,7 +29,7 @@ from ico3d.chat.serving import server
 from ico3d.chat.serving.guard import is_own
 from ico3d.chat.settings.conversation import read_settings
 from ico3d.cli import main
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.common.weights import weights_named
 from ico3d.errors import BundleError, SettingsError
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.visemes import VISEMES
 from ico3d.speech.articulation import ARTICULATION, articulation_track, viseme_track
 

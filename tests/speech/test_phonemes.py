@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.speech.articulation import ARTICULATION, articulation_track
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech

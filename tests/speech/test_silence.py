@@ -5,7 +5,7 @@ import pytest
 
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.packaged import FILE
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 from ico3d.speech.silence import SilenceGate
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.expression import EYE_NAMES
 from ico3d.studio.acting.articulation import LEAST_CLOSED, articulate, closure
 from ico3d.studio.acting.performance import PAUSE, SOUND_RATE, _glances, _speak, perform

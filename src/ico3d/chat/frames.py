@@ -7,7 +7,7 @@ import numpy as np
 from pipecat.frames.frames import DataFrame, Frame, InputAudioRawFrame, SystemFrame
 
 from ico3d.chat.wire.protocol import SPEECH_RATE, ClientMessage
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 
 Message = TypeVar("Message")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.errors import MissingExtraError, SettingsError
 
 _IPA = (

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.visemes import VISEMES, visemes
 
 ARTICULATION = ("opening", "spread", "rounding", "closure", "labiodental")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.speech.articulation import ARTICULATION, articulation_track
 from ico3d.speech.mel import FPS
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ico3d.common.catalogue.table import TABLE
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.common.weights import find_model, model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, ModelError

@@ -239,7 +239,7 @@ def resampled(sound: np.ndarray, rate: int) -> np.ndarray:
 @needs_face
 @needs_demo
 def test_the_demos_lips_open_when_the_sounds_do(tmp_path):
-    from ico3d.common.espeak import synthesize
+    from ico3d.common.espeak.speech import synthesize
     from ico3d.measure.lips import lip_lag_ms
     from ico3d.speech.articulation import articulation_track
 

@@ -10,7 +10,7 @@ from ico3d.chat.frames import PhonemesFrame, SpeechFrame
 from ico3d.chat.performing.expression import ExpressionProcessor
 from ico3d.chat.performing.face import ROW, Face
 from ico3d.chat.wire.protocol import SPEECH_RATE
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech
 from ico3d.speech.network import SpeechAdaptor

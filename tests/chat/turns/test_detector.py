@@ -13,7 +13,7 @@ from ico3d.chat.turns.floor import Floor, Verdict
 from ico3d.chat.turns.phrases import phrases
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.chat.wire.protocol import MICROPHONE_RATE as RATE
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from support.shared import SPEECH
 
 pytestmark = pytest.mark.slow

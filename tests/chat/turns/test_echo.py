@@ -9,7 +9,7 @@ from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.turns.echo import EchoGuard, similarity
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 
 pytestmark = pytest.mark.slow
 

@@ -27,7 +27,7 @@ from ico3d.chat.wire.protocol import (
     Transcript,
     Welcome,
 )
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.measure.talking.page import SCHEDULING, SimulatedPage, open_page
 from support.chat.pages import slowness
 

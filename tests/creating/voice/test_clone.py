@@ -51,7 +51,7 @@ def video(tmp_path_factory):
     """A film of a grey wall before which somebody talks for 20 s."""
     from ico3d.avatar.film.video import write_video
     from ico3d.capture.capture import Sound
-    from ico3d.common.espeak import synthesize
+    from ico3d.common.espeak.speech import synthesize
 
     text = "The quick brown fox jumps over the lazy dog while five boys watch with pleasure. " * 4
     speech = synthesize(text, "en-us+m3", 150)

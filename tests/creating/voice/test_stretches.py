@@ -23,7 +23,7 @@ def said(times: int) -> np.ndarray:
     """A text as often as that, a second of silence behind each."""
     import soxr
 
-    from ico3d.common.espeak import synthesize
+    from ico3d.common.espeak.speech import synthesize
 
     speech = synthesize(TEXT, "en-us+m3", 150)
     once = 0.5 * soxr.resample(speech.samples, speech.rate, RATE)

@@ -3,7 +3,7 @@
 import pytest
 
 from ico3d.chat.services.voice.espeak import NAMES
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.recording.keeping.plan import ALL_IDS, part_ids, scripts
 from support.needs import needs
 

@@ -11,7 +11,7 @@ from ico3d.avatar.baking.head_cost import Reference, reference
 from ico3d.avatar.baking.importance import logit_importance
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.common.spread import spread
 from ico3d.head.expressions import FEATURE_RATE, ExpressionTrack
 from ico3d.head.model import HeadModel

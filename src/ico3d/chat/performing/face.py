@@ -10,7 +10,7 @@ from ico3d.bundle.manifest import HeadInfo
 from ico3d.chat.performing.moods import Moods
 from ico3d.chat.performing.remote_mouth import RemoteMouth
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
 from ico3d.speech.eyes import EyeBehaviour

@@ -15,7 +15,7 @@ from ico3d.chat.settings.conversation import Expression
 from ico3d.chat.settings.keys import key_for
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.chat.wire.remote_expression import FINISH, PATH, ROW, START
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.common.typed import loose_json
 from ico3d.errors import Ico3dError, ServiceError

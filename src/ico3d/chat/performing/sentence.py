@@ -7,7 +7,7 @@ import numpy as np
 
 from ico3d.chat.performing.face import ROW, Face
 from ico3d.chat.wire.protocol import EXPRESSION_FPS
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 
 MOST, LEAST = 5, 3
 """Rows of a piece: 200 and 120 ms."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from ico3d.capture.sound import check_claim
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
 

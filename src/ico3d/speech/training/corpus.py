@@ -6,7 +6,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from ico3d.common.espeak import Phoneme, synthesize
+from ico3d.common.espeak.speech import Phoneme, synthesize
 from ico3d.speech.articulation import articulation_track, viseme_track
 from ico3d.speech.mel import HOP, RATE, WINDOW, mel_spectrogram, resampled
 from ico3d.speech.training.augment import recorded

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 
 STEP = 0.005
 """Seconds between the rows that are computed; frames are interpolated between them."""

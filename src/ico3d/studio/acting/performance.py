@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.common.espeak import Phoneme, synthesize
+from ico3d.common.espeak.speech import Phoneme, synthesize
 from ico3d.common.expression import EYE_NAMES
 from ico3d.errors import MissingExtraError
 from ico3d.studio.acting.articulation import articulate

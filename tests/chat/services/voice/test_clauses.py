@@ -22,7 +22,7 @@ from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.services.voice.clauses import ClauseProcessor, Clauses
 from ico3d.chat.services.voice.markup import speakable
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 
 
 async def cut(*deltas, aggregator=None):

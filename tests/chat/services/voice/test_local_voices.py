@@ -13,7 +13,7 @@ from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
 from ico3d.chat.services.voice.base import STARVED
 from ico3d.chat.settings.conversation import Choice
 from ico3d.chat.wire.protocol import SPEECH_RATE
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 from ico3d.errors import MissingModelError, SettingsError
 
 onnx = pytest.importorskip("onnx")

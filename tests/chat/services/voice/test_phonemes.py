@@ -5,7 +5,7 @@ import pytest
 
 from ico3d.chat.services.voice.hibari import with_output
 from ico3d.chat.services.voice.phonemes import timed
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.visemes import visemes
 
 

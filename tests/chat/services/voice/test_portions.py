@@ -13,7 +13,7 @@ from ico3d.chat.services.voice.base import PieceVoice, Spoken
 from ico3d.chat.services.voice.lasting import Lasting
 from ico3d.chat.services.voice.portions import MOST, parted, portions
 from ico3d.chat.wire.protocol import SPEECH_RATE
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 
 SENTENCE = "It was a bright cold day in April, and the clocks were striking thirteen."
 

@@ -15,7 +15,7 @@ from ico3d.chat.frames import PhonemesFrame
 from ico3d.chat.pipecat_internals import mark_synchronous
 from ico3d.chat.services.voice.portions import portions
 from ico3d.chat.wire.protocol import SPEECH_RATE
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.errors import MissingExtraError
 
 STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things

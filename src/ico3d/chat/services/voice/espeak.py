@@ -9,7 +9,7 @@ import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.base import PieceVoice, Spoken, at_speech_rate
-from ico3d.common.espeak import synthesize
+from ico3d.common.espeak.speech import synthesize
 
 VARIANT = "+f3"
 NAMES = {"en": "en-us", "zh": "cmn"}

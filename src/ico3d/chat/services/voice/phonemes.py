@@ -3,7 +3,7 @@
 import unicodedata
 from collections.abc import Iterable
 
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 
 STRESSES = "ˈˌ"  # stand before the sound that they belong to
 PAUSE = ""

@@ -21,7 +21,7 @@ from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.base import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.chat.services.voice.phonemes import timed
 from ico3d.chat.wire.protocol import SPEECH_RATE
-from ico3d.common.espeak import Phoneme
+from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.weights import model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.common import espeak_process
-from ico3d.common.espeak import synthesize
-from ico3d.common.espeak_process import process
+from ico3d.common.espeak import process as espeak_process
+from ico3d.common.espeak.process import process
+from ico3d.common.espeak.speech import synthesize
 from ico3d.errors import ServiceError, SettingsError
 
 pytest.importorskip("espeakng_loader")
@@ -89,7 +89,7 @@ def test_an_unknown_voice_is_one_sentence():
 def test_a_missing_package_names_its_extra():
     code = (
         "import sys; sys.modules['espeakng_loader'] = None\n"
-        "from ico3d.common.espeak import synthesize\n"
+        "from ico3d.common.espeak.speech import synthesize\n"
         "from ico3d.errors import MissingExtraError\n"
         "try: synthesize('hello')\n"
         "except MissingExtraError as error: print(error)"

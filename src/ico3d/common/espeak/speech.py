@@ -2,7 +2,7 @@
 
 Training uses the phonemes as ground truth; without a network, espeak-ng can serve as a voice. The
 library (GPL-3) comes with the package `espeakng-loader`; a process of its own speaks
-(`espeak_process.py`).
+(`process.py`).
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from ico3d.common.espeak_process import RefusedError, Request, SpeakerLostError, process
+from ico3d.common.espeak.process import RefusedError, Request, SpeakerLostError, process
 from ico3d.errors import MissingExtraError, ServiceError, SettingsError
 
 _VOICELESS_STOPS = ("p", "t", "k", "q", "c", "ʈ")

@@ -50,7 +50,7 @@ class RefusedError(Exception):
 
 @dataclass(frozen=True)
 class Request:
-    """What to say, and how; see `ico3d.common.espeak.synthesize`."""
+    """What to say, and how; see `ico3d.common.espeak.speech.synthesize`."""
 
     text: str
     voice: str
