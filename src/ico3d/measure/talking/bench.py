@@ -14,6 +14,7 @@ from ico3d.chat.settings.conversation import ChatSettings, Turns
 from ico3d.errors import Ico3dError
 from ico3d.measure.talking import trials
 from ico3d.measure.talking.kinds import Kind
+from ico3d.measure.talking.page import PATIENCE
 from ico3d.measure.talking.questions import Sayings, broken_off
 from ico3d.measure.talking.scripted import Script
 from ico3d.measure.talking.serving import serving, serving_script
@@ -71,8 +72,8 @@ def measure(
         return _measure(bundle, settings, said, kinds, turns, told)
     except TimeoutError as error:
         raise Ico3dError(
-            "the avatar did not answer for 20 s: the machine is too busy, or a service fails "
-            "(ico3d serve --verbose tells which)."
+            f"the avatar did not answer for {PATIENCE:g} s: the machine is too busy, or a service "
+            "fails (ico3d serve --verbose tells which)."
         ) from error
 
 

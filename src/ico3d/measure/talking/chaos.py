@@ -18,9 +18,9 @@ from ico3d.chat.supervision.apologies import apology
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Answer, End, Error, Hello, Place, Speech, Text
 from ico3d.chat.wire.sentences import FULL
-from ico3d.measure.talking.page import SimulatedPage, open_page
+from ico3d.measure.talking.page import PATIENCE, SimulatedPage, open_page
 from ico3d.measure.talking.scripted import Fault, Script
-from ico3d.measure.talking.visits import PATIENCE, ask
+from ico3d.measure.talking.visits import ask
 
 Happens = Literal["ask", "drop", "read slowly", "stall", "freeze", "jump", "crowd"]
 """What happens: the question alone, of which a service's fault may come; the connection is cut; a

@@ -11,7 +11,7 @@ from rich.table import Table
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire.protocol import SPEECH_RATE, End, Speech, Text
 from ico3d.errors import SettingsError
-from ico3d.measure.talking.page import SCHEDULING, SimulatedPage, open_page
+from ico3d.measure.talking.page import PATIENCE, SCHEDULING, SimulatedPage, open_page
 from ico3d.measure.talking.scripted import Script
 from ico3d.measure.talking.serving import serving_script
 
@@ -21,7 +21,6 @@ SCRIPT = Script(
     answer="One. Two. Three. Four.", seconds=3.0, pitch=LOWEST, apart=APART
 )  # 12 s of speech
 WITHIN = 2.0  # s in which all have come, and all have asked: people do not do so at once
-PATIENCE = 60.0  # s within which an answer must be over
 
 
 @dataclass(frozen=True)

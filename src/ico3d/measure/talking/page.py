@@ -28,6 +28,7 @@ from ico3d.chat.wire.protocol import (
     Welcome,
 )
 
+PATIENCE = 60.0  # s within which anything awaited must come
 SCHEDULING = 0.05  # s from the arrival of the first piece to its first sample
 CLOCK_EVERY = 0.15  # s
 
@@ -124,7 +125,7 @@ class SimulatedPage:
         self,
         kind: type[M],
         since: int = 0,
-        timeout: float = 20.0,
+        timeout: float = PATIENCE,
         where: Callable[[M], bool] = lambda _: True,
     ) -> tuple[float, M]:
         """Waits for the first message of a kind that `where` accepts, from log entry `since` on.

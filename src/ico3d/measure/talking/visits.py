@@ -6,11 +6,10 @@ from contextlib import asynccontextmanager
 from random import Random
 
 from ico3d.chat.wire.protocol import End, Interrupt, Speech, Stop, Text, Welcome
-from ico3d.measure.talking.page import SimulatedPage, open_page
+from ico3d.measure.talking.page import PATIENCE, SimulatedPage, open_page
 
 QUESTION = "What shall I ask?"
 AWAY = 1.0  # s until somebody whose connection was cut is there again
-PATIENCE = 60.0  # s within which anything awaited must come
 
 Visit = Callable[[str, bool], Awaitable[None]]
 
