@@ -12,7 +12,7 @@ import numpy as np
 import soundfile
 import soxr
 
-from ico3d.common import espeak
+from ico3d.common.espeak.speech import synthesize
 
 RATE = 48_000  # what Chromium's fake device runs at
 LEVEL = 0.2  # of full scale, as people before a laptop; browsers amplify it, and more would clip
@@ -25,7 +25,7 @@ def sound(part: str) -> np.ndarray:
     if part.endswith(".wav"):
         samples, rate = soundfile.read(part, dtype="float32")
     else:
-        spoken = espeak.synthesize(part)
+        spoken = synthesize(part)
         samples, rate = spoken.samples, spoken.rate
     samples = soxr.resample(samples, rate, RATE)
     return LEVEL * samples / np.abs(samples).max()
