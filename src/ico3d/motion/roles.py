@@ -138,6 +138,13 @@ class Cast:
         """(3,) position of a role's first joint at rest, metres."""
         return self.rig.joints[self.joints[role][0]]
 
+    def below(self, role: str) -> np.ndarray:
+        """(J,) bool: which joints are a role's first one, or hang from it."""
+        first, found = self.joints[role][0], np.zeros(len(self.rig.parents), bool)
+        for joint, parent in enumerate(self.rig.parents):
+            found[joint] = joint == first or (parent >= 0 and found[parent])
+        return found
+
     def eyes(self) -> np.ndarray | None:
         """(3,) point between the eyes at rest, metres; None where the rig has no eyes."""
         names = EYES[self.naming]

@@ -42,7 +42,10 @@ def garments_of(body: BakedSkinned, cast: Cast, surfaces: Surfaces) -> np.ndarra
     clothes[surfaces.head | np.isin(mainly, _fingers(cast))] = 0
     sure = (clothes > 0.9) & (body.opacities > 127)
     leg = np.isin(mainly, legs(cast))
-    lower, foot = (_below(cast, role)[mainly] for role in ("knee", "ankle"))
+    lower, foot = (
+        (cast.below(f"left_{role}") | cast.below(f"right_{role}"))[mainly]
+        for role in ("knee", "ankle")
+    )
     ankle, knee = (np.mean([cast.place(f"{s}_{r}")[1] for s in SIDES]) for r in ("ankle", "knee"))
     height = body.means[:, 1]
     low = foot & (height < ankle)
@@ -82,15 +85,6 @@ def _fingers(cast: Cast) -> list[int]:
     """Joints of the fingers."""
     roles = [role for side in SIDES for role in arm_roles(side)[4:]]
     return [joint for role in roles for joint in cast.joints.get(role, ())]
-
-
-def _below(cast: Cast, role: str) -> np.ndarray:
-    """(J,) bool: which joints are a role's on either side, or below one of them."""
-    starts = {cast.joints[f"{side}_{role}"][0] for side in SIDES}
-    found = np.zeros(len(cast.rig.parents), bool)
-    for joint, parent in enumerate(cast.rig.parents):
-        found[joint] = joint in starts or (parent >= 0 and found[parent])
-    return found
 
 
 def _median(colors: np.ndarray) -> np.ndarray:

@@ -14,7 +14,6 @@ from scipy.spatial import KDTree
 from ico3d.bundle.skinned.baked import WEIGHT_UNIT, BakedSkinned
 from ico3d.errors import SettingsError
 from ico3d.motion.roles import Cast, cast
-from ico3d.rig.rig import Rig
 
 LIT = 0.65
 """Quantile of a hand's brightness, in mean logits of r, g, b, that counts as skin in light."""
@@ -59,18 +58,9 @@ def _share_of_hand(baked: BakedSkinned, roles: Cast, side: str) -> np.ndarray:
     wrist, middle = roles.place(f"{side}_wrist"), roles.place(f"{side}_middle1")
     along = middle - wrist
     beyond = (baked.means - wrist) @ along > PALM * (along @ along)  # (N,)
-    hand = _below(baked.rig, roles.joints[f"{side}_wrist"][0])
-    carried = np.isin(baked.joints, hand) * (baked.weights / np.float32(WEIGHT_UNIT))  # (N, 4)
+    hand = roles.below(f"{side}_wrist")[baked.joints]  # (N, 4)
+    carried = hand * (baked.weights / np.float32(WEIGHT_UNIT))  # (N, 4)
     return carried.sum(1) * beyond
-
-
-def _below(rig: Rig, joint: int) -> list[int]:
-    """A joint, and all that hang from it."""
-    found = [joint]
-    for number in range(joint + 1, len(rig.parents)):
-        if rig.parents[number] in found:
-            found.append(number)
-    return found
 
 
 def _around(baked: BakedSkinned, skin: np.ndarray, bright: np.ndarray) -> np.ndarray:

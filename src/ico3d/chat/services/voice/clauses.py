@@ -58,10 +58,14 @@ class Clauses(SimpleTextAggregator):
     def _rest(self, text: str) -> None:
         set_aggregated(self, text)
 
+    async def reset(self) -> None:
+        """Forgets the text."""
+        await super().reset()
+        self._marks = self._spaces = 0
+
     async def begin(self) -> None:
         """Starts a new answer."""
         await self.reset()
-        self._marks = self._spaces = 0
         self._first = True
 
     async def aggregate(self, text: str) -> AsyncIterator[Aggregation]:
@@ -144,7 +148,6 @@ class Clauses(SimpleTextAggregator):
     async def _restart(self, text: str) -> None:
         """Forgets what it was waiting for."""
         await self.reset()
-        self._marks = self._spaces = 0
         self._rest = text
 
 

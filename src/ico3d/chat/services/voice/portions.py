@@ -30,7 +30,7 @@ def portions(text: str) -> Iterator[str]:
     """
     begin, letters, space = 0, 0, 0  # of a portion; `space` is behind its last white space
     for at, char in enumerate(text):
-        written = len(unicodedata.normalize("NFKC", char))
+        written = _written(char)
         if letters + written > MOST and at > begin:
             end = space if space > begin else at
             yield text[begin:end]
