@@ -53,10 +53,10 @@ export function lastOnset({ microphone }: Record, end: number): number {
   return voiced.findLast(({ at }, i) => i === 0 || at - voiced[i - 1]!.at > 1000)!.at;
 }
 
-/** A WAV in which the sentence is said again and again: on a busy machine nobody knows when the answer will come. */
-export function makeVoice(path: string): void {
+/** A WAV in which the sentence is said, by default again and again: on a busy machine nobody knows when the answer will come. */
+export function makeVoice(path: string, times = 8): void {
   const sentence = existsSync(RECORDING) ? RECORDING : SENTENCE;
-  runPython('sound/voice.py', path, '2', ...Array.from({ length: 8 }, () => [sentence, '4.5']).flat());
+  runPython('sound/voice.py', path, '2', ...Array.from({ length: times }, () => [sentence, '4.5']).flat());
 }
 
 /** Sound waits for a click, as in browsers that are not tested; before the page is opened. */
