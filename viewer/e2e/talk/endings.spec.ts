@@ -160,3 +160,26 @@ test('a microphone whose worklet does not load is shown as closed, and is', asyn
   expect(await pressed(browser)).toBe('false');
   expect(await microphones(page)).toEqual(['ended', 'ended']);
 });
+
+test('the visitor ends the talk, and nothing is heard or said until they begin another; sound that stays off is told', async () => {
+  const visitor = await visit(talkingUrl);
+  const { page } = visitor;
+  await page.click('#microphone');
+  await page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
+  await page.focus('#stage');
+  await page.keyboard.press('m');
+  await page.click('#settings-button');
+  await page.click('#hang-up');
+  await says(visitor, /^You have ended this conversation\.$/);
+  expect([await microphones(page), await focused(visitor), await page.isVisible('#settings')]).toEqual([['ended'], 'again', false]);
+  const said = (await readRecord(page)).received.length;
+  await page.waitForTimeout(1000);
+  expect((await readRecord(page)).received.length).toBe(said);
+
+  await page.click('#again');
+  await goes(visitor);
+  await until(visitor, ({ received }) => received.filter(({ type }) => type === 'welcome').length === 2);
+  expect(await pressed(visitor)).toBe('false');
+  await page.reload();
+  await page.waitForFunction(() => document.getElementById('notices')!.textContent!.includes('sound is off: the loudspeaker button'));
+});

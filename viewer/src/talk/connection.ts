@@ -120,6 +120,14 @@ export class Connection {
     this.socket?.close(1000); // on purpose: the server gives the place away at once
   }
 
+  /** The visitor ends the session; another one may begin. */
+  hangUp(): void {
+    this.close();
+    this.over = true;
+    this.forget();
+    this.events.ended({ sentence: say('ended'), again: true, wait: null });
+  }
+
   /** Leaves for good. */
   close(): void {
     clearTimeout(this.retry);
@@ -184,7 +192,7 @@ export class Connection {
     if (message.type === 'welcome') this.welcome(message);
     else if (message.type === 'place') this.queue(message);
     else if (message.type === 'ack') this.sound.acknowledge(message.frames);
-    else if (message.type === 'error' && message.fatal) this.hangUp(told(message), message.again);
+    else if (message.type === 'error' && message.fatal) this.dismissed(told(message), message.again);
     else if (message.type === 'speech') this.speech(message);
     else if (message.type !== 'beat') this.events.message(message);
   }
@@ -206,7 +214,7 @@ export class Connection {
 
   private welcome(message: WelcomeMessage): void {
     if (message.version !== VERSION) {
-      return this.hangUp(say('version'), false);
+      return this.dismissed(say('version'), false);
     }
     const replaced = this.session !== null && this.session !== message.session;
     this.session = message.session;
@@ -229,7 +237,7 @@ export class Connection {
   }
 
   /** The session ends when the socket has closed: its code tells more. */
-  private hangUp(sentence: Sentence, again: boolean): void {
+  private dismissed(sentence: Sentence, again: boolean): void {
     this.fatal = { sentence, again };
     this.welcomed = false;
     this.socket!.close();

@@ -195,6 +195,11 @@ export class Conversation {
     this.connection.send({ type: 'interrupt', utterance });
   }
 
+  /** Ends the talk, as a server does; the visitor may begin another one. */
+  hangUp(): void {
+    this.connection.hangUp();
+  }
+
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   toggleMicrophone(): Promise<void> {
     return this.voice.toggle();

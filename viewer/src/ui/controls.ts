@@ -66,7 +66,7 @@ export class Controls {
     this.microphone.onclick = () => void conversation.toggleMicrophone();
     this.stop.onclick = () => conversation.interrupt();
     this.bindTalk(conversation, notice);
-    this.bindMute(conversation);
+    this.bindMute(conversation, notice);
     this.hear('keydown', (event) => {
       if (isFor('escape', event)) conversation.interrupt();
       if (isFor('write', event) && !isForTexts(event)) {
@@ -77,7 +77,7 @@ export class Controls {
   }
 
   /** The button turns the avatar's sound off and on, and so does M; the tab remembers it. */
-  private bindMute(conversation: Conversation): void {
+  private bindMute(conversation: Conversation, notice: (sentence: Sentence) => void): void {
     const show = (muted: boolean) => {
       conversation.muted = muted;
       this.mute.setAttribute('aria-pressed', String(muted));
@@ -93,6 +93,7 @@ export class Controls {
       if (isFor('mute', event) && !event.repeat && !isForOthers(event)) toggle();
     });
     show(rememberedInTab('muted') === 'true');
+    if (conversation.muted) notice(say('mute.kept')); // else somebody waits for a greeting that is not heard
   }
 
   /** The button is held with a pointer, or with the space bar wherever that types nothing. */

@@ -127,7 +127,7 @@ export function makePage(
   const talk = (conversation: Conversation) => {
     byId(root, 'state-line').hidden = false;
     controls.bind(conversation, view.notice);
-    settings.offerCaptions();
+    settings.offerTalk(() => conversation.hangUp());
     transcript.offer();
     choose = (offer) => conversation.choose(offer);
     again = () => conversation.start();

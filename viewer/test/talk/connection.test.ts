@@ -82,6 +82,20 @@ test('a session that ended is not resumed, and nobody is called back who went aw
   expect(connection.send({ type: 'text', text: 'Hello?' })).toBe(true);
 });
 
+test('who hangs up is not called back, and begins anew when they want to', () => {
+  const { connection, endings, told } = connect();
+  ScriptedSocket.last.welcome();
+  connection.hangUp();
+  expect(ScriptedSocket.last.closed).toBe(true);
+  expect(endings).toEqual([{ sentence: say('ended'), again: true, wait: null }]);
+  expect(connection.send({ type: 'text', text: 'Hello?' })).toBe(false);
+  expect(nextTry()).toBe(null);
+  connection.open();
+  ScriptedSocket.last.welcome({ session: 'second' });
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null, last_index: -1 }]);
+  expect(told).toEqual(['welcome, resumed false, replaced false', 'welcome, resumed false, replaced false']);
+});
+
 test('what a new session would not mend is not tried again', () => {
   const { endings } = connect();
   const sentence = 'this page speaks version 2 of the protocol, the server version 4: reload the page.';

@@ -47,7 +47,7 @@ export class Disclosure {
     this.show(!this.isOpen);
   }
 
-  private close(): void {
+  close(): void {
     this.show(false);
     this.back.focus();
   }

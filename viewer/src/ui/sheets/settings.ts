@@ -7,15 +7,16 @@ import { offerLanguages } from './languages.ts';
 
 const SIZES = ['small', 'normal', 'large'];
 
-/** The sheet of what the visitor may choose: language, captions, and what a screen reader says. */
+/** The sheet of what the visitor may choose: language, captions, what a screen reader says, and to end the talk. */
 export class Settings {
   private readonly page: HTMLElement;
+  private readonly sheet: Disclosure;
   private readonly announced: HTMLInputElement;
 
   constructor(page: HTMLElement, words: PageWords, signal: AbortSignal) {
     this.page = page;
     byId(page, 'settings-button').append(icon('sliders'));
-    new Disclosure(page, 'settings', signal);
+    this.sheet = new Disclosure(page, 'settings', signal);
     offerLanguages(byId(page, 'language'), words, signal);
     this.announced = this.offer('announced', () => {});
     this.offer('captions-shown', (shown) => (page.dataset.captions = shown ? 'on' : 'off'));
@@ -27,9 +28,19 @@ export class Settings {
     return this.announced.checked;
   }
 
-  /** There is somebody to talk with. */
-  offerCaptions(): void {
+  /**
+   * There is somebody to talk with.
+   *
+   * @param hangUp ends the talk
+   */
+  offerTalk(hangUp: () => void): void {
     byId(this.page, 'caption-settings').hidden = false;
+    const button = byId<HTMLButtonElement>(this.page, 'hang-up');
+    button.hidden = false;
+    button.onclick = () => {
+      this.sheet.close();
+      hangUp();
+    };
   }
 
   /** A switch that is on until the visitor turns it off. */
