@@ -14,6 +14,7 @@ greeting = "Good evening."
 manner = "Warm, with dry humour."
 languages = ["en", "pt-BR"]
 forbidden = ["politics | elections", "my age"]
+suggestions = ["Who are you?"]
 notes = ["who are you => I am Ada.", "The museum closes at six."]
 [voice]
 "espeak-ng" = "en+f2"
@@ -26,6 +27,7 @@ ADA = Persona(
     ("en", "pt-BR"),
     {"espeak-ng": "en+f2"},
     ("politics | elections", "my age"),
+    ("Who are you?",),
 )
 
 
@@ -88,12 +90,23 @@ def test_a_missing_or_huge_file_is_one_sentence(tmp_path):
         ({"notes": ("|".join(["ab"] * 1001) + "=> c",) * 10}, "notes must ask at most 10000"),
         ({"notes": ("b" * 4000,) * 126}, "has 504004 letters; at most 500000"),
         ({"voice": {"espeak-ng": "b" * 4001}}, "voice must have at most 4000"),
+        ({"suggestions": ("who?",) * 13}, "suggestions must be at most 12 questions"),
+        ({"suggestions": ("b" * 101,)}, "questions of at most 100 letters"),
+        ({"suggestions": (" ",)}, "suggestions must not be empty texts"),
     ],
 )
 def test_a_persona_has_as_much_text_as_people_write(given, message):
     with pytest.raises(BundleError, match=message):
         check_persona(Persona("Anna", **given), "anna")
     check_persona(Persona("Anna", notes=("b" * 4000,) * 100, forbidden=("old war",) * 100), "anna")
+
+
+def test_what_is_proposed_is_what_the_first_notes_answer_or_what_the_persona_says():
+    notes = ("A fact.", " | who are you| your name => Ada.", "=> Nobody asks.", "why|how => So.")
+    notes += ("when => Now.", "where => Here.")
+    assert Persona("Ada", notes=notes).proposed == ("who are you", "why", "when")
+    assert Persona("Ada", notes=notes, suggestions=("Where?",)).proposed == ("Where?",)
+    assert Persona("Ada").proposed == ()
 
 
 def test_bundles_hold_what_a_persona_says_and_old_ones_stay_readable(packed):

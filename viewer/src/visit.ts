@@ -134,7 +134,8 @@ export class Visit {
     root.dataset.path = stage.painter.path;
     watchCover(root, signal, stage.keepClear.bind(stage));
     const home = server.home();
-    const talker = { name, languages: manifest.persona.languages ?? [], home, kept: this.ports.keeps(home, identityOf(manifest)) };
+    const { languages = [], suggestions = [] } = manifest.persona;
+    const talker = { name, languages, suggestions, home, kept: this.ports.keeps(home, identityOf(manifest)) };
     const page = makePage(root, words, talker, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page, stage) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };

@@ -16,6 +16,8 @@ MOST_LETTERS = 4000  # of a text
 MOST_IN_ALL = 500_000  # letters of all texts, more than people write by hand
 MOST_NAMES, LONGEST_NAME = 1000, 100  # of forbidden topics, and letters of a name
 MOST_ENTRIES = 100  # of a list that is no list of notes
+MOST_SUGGESTIONS, LONGEST_SUGGESTION = 12, 100  # questions that are proposed, and letters of one
+SUGGESTED_NOTES = 3  # that are proposed where the persona says nothing else
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Persona:
         voice: Name of the avatar's voice for each provider of voices, such as {"espeak-ng":
             "en+f2"}.
         forbidden: Topics about which the avatar declines to talk, each "word | other word".
+        suggestions: Questions that are proposed to visitors; by default those of the first notes.
     """
 
     name: str
@@ -42,6 +45,14 @@ class Persona:
     languages: tuple[str, ...] = ()
     voice: dict[str, str] = field(default_factory=dict[str, str])
     forbidden: tuple[str, ...] = ()
+    suggestions: tuple[str, ...] = ()
+
+    @property
+    def proposed(self) -> tuple[str, ...]:
+        """The questions that are proposed to visitors."""
+        asked = (note.partition("=>")[0] for note in self.notes if "=>" in note)
+        first = (next(filter(None, map(str.strip, one.split("|"))), "") for one in asked)
+        return self.suggestions or tuple(filter(None, first))[:SUGGESTED_NOTES]
 
 
 REQUIRED = ("name", "greeting", "notes")
@@ -111,6 +122,11 @@ def check_persona(persona: Persona, where: str) -> None:
     _require(len(persona.notes) <= MAX_NOTES, where, "notes", f"be at most {MAX_NOTES}")
     questions = sum(note.partition("=>")[0].count("|") + 1 for note in persona.notes)
     _require(questions <= MAX_NOTES, where, "notes", f"ask at most {MAX_NOTES} questions")
+    few = len(persona.suggestions) <= MOST_SUGGESTIONS
+    short = max(map(_letters, persona.suggestions), default=0) <= LONGEST_SUGGESTION
+    what = f"be at most {MOST_SUGGESTIONS} questions of at most {LONGEST_SUGGESTION} letters"
+    _require(few and short, where, "suggestions", what)
+    _require(all(map(str.strip, persona.suggestions)), where, "suggestions", "not be empty texts")
     for entry in ("languages", "voice", "forbidden"):
         few = len(getattr(persona, entry)) <= MOST_ENTRIES
         _require(few, where, entry, f"be at most {MOST_ENTRIES}")
@@ -134,6 +150,7 @@ def _check_lengths(persona: Persona, where: str) -> None:
         "languages": persona.languages,
         "voice": (*persona.voice, *persona.voice.values()),
         "forbidden": persona.forbidden,
+        "suggestions": persona.suggestions,
     }
     total = 0
     for entry, given in texts.items():

@@ -61,6 +61,7 @@ async def test_files_are_compressed_where_that_helps_and_is_understood(bundle, c
     plain = gzip.decompress(wire) if coding == "gzip" else wire
     told = json.loads(plain)
     assert bundle.manifest.persona.notes and not told["persona"].pop("notes")  # what it knows
+    assert told["persona"].pop("suggestions") == list(bundle.manifest.persona.proposed)
     own = json.loads(bundle.read("manifest.json"))
     del own["persona"]["notes"]
     assert told == own
@@ -84,7 +85,12 @@ async def test_who_has_a_file_in_its_coding_is_not_sent_it_again(bundle):
 async def test_a_persona_file_shows_its_name_and_keeps_its_notes(bundle):
     async with client(bundle, Persona("Ada", "Hello.", ("secret => safe",))) as page:
         shown = (await page.get("/manifest.json", headers={"Accept-Encoding": "gzip"})).json()
-    assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
+    assert shown["persona"] == {
+        "name": "Ada",
+        "greeting": "Hello.",
+        "notes": [],
+        "suggestions": ["secret"],
+    }
 
 
 async def test_a_file_that_changed_on_disk_is_an_error_in_one_sentence(bundle, monkeypatch):

@@ -112,7 +112,7 @@ async def test_figures_are_on_a_port_of_their_own(typed):
 
 
 async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
-    ada = Persona("Ada", "Hello.", ("secret => The safe is open.",), "Sly.", forbidden=("keys",))
+    ada = Persona("Ada", "Hello.", ("The safe is open.",), "Sly.", forbidden=("keys",))
     async with serving(bundle, persona=ada) as (url, _), visiting(url) as client:
         shown = (await client.get("/bundle/manifest.json")).json()
     assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}

@@ -52,6 +52,12 @@ test('on a wide screen all of them stay', async () => {
   expect((await bar()).shown).toEqual(['microphone', 'mute', 'talk', 'text', 'send']);
 });
 
+test('the browser knows what it may propose to who does not know what to ask', async () => {
+  // The list itself is drawn by the browser, outside of the page, and not at all without a screen.
+  const proposed = await browser.page.locator('#text').evaluate((text) => [...(text as HTMLInputElement).list!.options].map(({ value }) => value));
+  expect(proposed).toEqual(['We must find a new home in the stars', 'Tell me about yourself', 'Who are you']);
+});
+
 test('the button to talk shows what is held while one speaks, not what stands for chats', async () => {
   const drawn = await browser.page.locator('#talk path').getAttribute('d');
   expect(drawn).not.toContain('l-4 4v-4'); // the tip of a speech bubble

@@ -102,7 +102,7 @@ export interface Manifest {
   skinned: SkinnedInfo | null; // or on a skeleton
   camera: StartCamera;
   background: [number, number, number];
-  persona: { name: string; greeting: string; languages?: readonly string[] };
+  persona: { name: string; greeting: string; languages?: readonly string[]; suggestions?: readonly string[] };
   provenance: Provenance;
 }
 

@@ -16,6 +16,7 @@ import { Settings } from './sheets/settings.ts';
 import { ServiceSheet } from './sheets/sheet.ts';
 import { Transcript, type Talker } from './sheets/transcript.ts';
 import { StandIns } from './stand-ins.ts';
+import { suggest } from './suggestions.ts';
 
 const NOTICE_TIME = 9000; // ms
 
@@ -43,6 +44,7 @@ export function makePage(
   markPressed(byId(root, 'stage'), signal);
   const captions = new Captions(root, talker.languages[0] ?? '', signal);
   const controls = new Controls(root, words, talker.languages, signal);
+  suggest(root, talker.suggestions);
   const line = new LineNotice(root, words, signal);
   const panel = new Panel(root, words, figures, signal);
   const settings = new Settings(root, words, signal);

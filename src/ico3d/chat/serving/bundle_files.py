@@ -103,7 +103,12 @@ class BundleFiles:
         if name != MANIFEST:
             return self._bundle.read(name)
         persona = self._persona or self._bundle.manifest.persona
-        shown = Persona(persona.name, persona.greeting, languages=persona.languages)
+        shown = Persona(
+            persona.name,
+            persona.greeting,
+            languages=persona.languages,
+            suggestions=persona.proposed,
+        )
         return replace(self._bundle.manifest, persona=shown).to_json()
 
     def _compressed(self, name: str) -> Content | None:

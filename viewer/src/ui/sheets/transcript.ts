@@ -17,6 +17,8 @@ export interface Talker {
   name: string;
   /** Languages of the talk, BCP 47, the usual one first; none if they are unknown. */
   languages: readonly string[];
+  /** Questions that are proposed to visitors. */
+  suggestions: readonly string[];
   /** Address of its server. */
   home: string;
   /** Where its lines stay once a talk is over. */

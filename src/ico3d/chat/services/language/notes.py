@@ -18,7 +18,6 @@ from ico3d.motion.composing.lexicon import requested
 CONFIDENT = 0.42  # score from which a note is taken as the answer
 WORDS, LETTERS = 0.7, 0.3  # weights of whole words and of letter triples
 MOST_LETTERS = 1000  # of what a visitor says that are compared with notes
-EXAMPLES = 3  # questions that the avatar proposes when it has no answer
 ENDINGS = ("ingly", "edly", "ing", "ed", "es", "ly", "s")
 CONTRACTIONS = (
     (r"\bwhat's\b", "what is"),
@@ -107,8 +106,7 @@ class Notes:
         """The answer if no note matches."""
         if not self.notes:
             return "I do not know that. I have no notes to answer from yet."
-        examples = [f"“{note.questions[0]}”" for note in self.notes[:EXAMPLES]]
-        listed = ", or ".join(examples)
+        listed = ", or ".join(f"“{question}”" for question in self._persona.proposed)
         return f"I do not know that. You can ask me, for example: {listed}."
 
     def refusal(self) -> str:
