@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.common.espeak import process as espeak_process
+from ico3d.common.espeak import isolated
 from ico3d.common.espeak.process import process
 from ico3d.common.espeak.speech import synthesize
 from ico3d.errors import ServiceError, SettingsError
@@ -115,7 +115,7 @@ def test_a_text_that_breaks_the_library_ends_no_process_but_its_own():
 
 def test_a_text_without_an_end_is_given_up(monkeypatch):
     synthesize("Good morning.")
-    monkeypatch.setattr(espeak_process, "LONGEST", 0.05)
+    monkeypatch.setattr(process, "longest", 0.05)
     with pytest.raises(ServiceError, match="failed at a text"):
         synthesize("a long sentence " * 3000)
     monkeypatch.undo()
@@ -124,13 +124,13 @@ def test_a_text_without_an_end_is_given_up(monkeypatch):
 
 def test_whoever_stops_in_the_middle_leaves_no_half_answer(monkeypatch):
     before = synthesize("One.")
-    read = espeak_process._read
+    read = isolated._read
 
     def stop(pipe, count):
         read(pipe, count)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(espeak_process, "_read", stop)
+    monkeypatch.setattr(isolated, "_read", stop)
     with pytest.raises(KeyboardInterrupt):
         synthesize("A longer sentence.")
     monkeypatch.undo()

@@ -10,7 +10,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from ico3d.common.espeak.process import RefusedError, Request, SpeakerLostError, process
+from ico3d.common.espeak.isolated import LostError, RefusedError
+from ico3d.common.espeak.process import Request, ask
 from ico3d.errors import MissingExtraError, ServiceError, SettingsError
 
 _VOICELESS_STOPS = ("p", "t", "k", "q", "c", "ʈ")
@@ -70,10 +71,10 @@ def synthesize(
     if find_spec("espeakng_loader") is None:
         raise MissingExtraError("espeakng-loader", "voice", "the espeak-ng voice")
     try:
-        answer = process.ask(Request(text, voice, rate, pitch, pitch_range))
+        answer = ask(Request(text, voice, rate, pitch, pitch_range))
     except RefusedError as error:
         raise SettingsError(str(error)) from None
-    except SpeakerLostError:
+    except LostError:
         raise ServiceError("espeak-ng failed at a text.") from None
     samples = np.frombuffer(answer.pcm, np.int16).astype(np.float32) / 32768  # (S,)
     return Speech(samples, answer.rate, _timed(answer.marks, samples, answer.rate))

@@ -10,6 +10,7 @@ from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.services.provider import Context, lacks_package, lacks_weights
 from ico3d.chat.services.voice.base import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.common.espeak.phonemes import of_kokoro
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingExtraError, SettingsError
 
@@ -102,4 +103,10 @@ def engine(folder: Path) -> Any:
     """Loads the model, once per process."""
     from kokoro_onnx import Kokoro
 
-    return Kokoro(str(folder / "kokoro-v1.0.onnx"), str(folder / "voices-v1.0.bin"))
+    model = Kokoro(str(folder / "kokoro-v1.0.onnx"), str(folder / "voices-v1.0.bin"))
+
+    def phonemize(text: str, lang: str = "en-us", norm: bool = True) -> str:
+        return of_kokoro(text, lang)
+
+    model.tokenizer.phonemize = phonemize
+    return model

@@ -21,6 +21,7 @@ from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.base import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.chat.services.voice.phonemes import timed
 from ico3d.chat.wire.protocol import SPEECH_RATE
+from ico3d.common.espeak.phonemes import of_piper
 from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.weights import model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
@@ -121,7 +122,9 @@ def engine(model: Path, cuda: bool) -> Any:
             "use kokoro or openvoice."
         )
     aligned = find_spec("onnx") is not None  # with which Piper finds the durations in its model
-    return PiperVoice.load(model, use_cuda=cuda, include_alignments=aligned)
+    voice = PiperVoice.load(model, use_cuda=cuda, include_alignments=aligned)
+    voice.phonemize = functools.partial(of_piper, Path(f"{model}.json"))
+    return voice
 
 
 class Telling:

@@ -1,0 +1,81 @@
+"""Phonemes for Piper and Kokoro, which have espeak-ng make them.
+
+The library writes beyond a buffer at some texts (`i.` a hundred times is one) and ends its process.
+So that is another one than that of the server, which runs this module; the voice itself, which
+takes nearly all of the time, stays with the server.
+"""
+
+import functools
+import json
+from pathlib import Path
+from typing import Any
+
+from ico3d.common.espeak.isolated import Isolated, LostError, RefusedError, Told, serve
+from ico3d.errors import ServiceError
+
+LONGEST = 10.0  # s for a piece of an answer; it takes milliseconds
+
+process = Isolated("ico3d.common.espeak.phonemes", LONGEST)
+"""That of this process."""
+
+
+def of_piper(description: Path, text: str) -> list[list[str]]:
+    """The phonemes of each sentence of a text.
+
+    Args:
+        description: The voice's own, the JSON file beside its model.
+        text: What the voice is to say.
+
+    Raises:
+        ServiceError: If espeak-ng fails at the text.
+    """
+    return _ask({"voice": "piper", "description": str(description), "text": text})
+
+
+def of_kokoro(text: str, language: str) -> str:
+    """The phonemes of a text.
+
+    Args:
+        text: What the voice is to say.
+        language: espeak-ng's name of its language.
+
+    Raises:
+        ServiceError: If espeak-ng fails at the text.
+    """
+    return _ask({"voice": "kokoro", "language": language, "text": text})
+
+
+def _ask(request: dict[str, Any]) -> Any:
+    try:
+        return process.ask(request)[0]["phonemes"]
+    except LostError:
+        raise ServiceError("espeak-ng failed at a text.") from None
+    except RefusedError as error:
+        raise ServiceError(f"no phonemes for a text: {error}.") from None
+
+
+@functools.cache
+def _piper(description: Path) -> Any:
+    """Piper's voice without its model."""
+    from piper import PiperConfig, PiperVoice
+
+    return PiperVoice(None, PiperConfig.from_dict(json.loads(description.read_bytes())))
+
+
+@functools.cache
+def _kokoro() -> Any:
+    from kokoro_onnx.tokenizer import Tokenizer
+
+    return Tokenizer()
+
+
+def _answer(request: dict[str, Any]) -> Told:
+    if request["voice"] == "piper":
+        phonemes = _piper(Path(request["description"])).phonemize(request["text"])
+    else:
+        phonemes = _kokoro().phonemize(request["text"], request["language"])
+    return {"phonemes": phonemes}, b""
+
+
+if __name__ == "__main__":
+    serve(_answer)
