@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ico3d.motion.composing import accents as module
 from ico3d.motion.composing.accents import (
     FRAME,
+    GrowingAccents,
     GrowingLoudness,
     Word,
     accents,
@@ -60,6 +62,23 @@ def test_more_sound_does_not_change_accents():
         part = accents(words, level[:known], False)
         assert part == whole[: len(part)]
         assert all(word.end < known * FRAME for word in words[: part[-1].word + 1])
+
+
+def test_asking_again_and_again_finds_the_same_and_looks_at_each_word_once(monkeypatch):
+    rng = np.random.default_rng(5)
+    level = np.repeat(rng.uniform(-60, -10, 1200), 10)  # 120 s
+    words = tuple(Word("word", 0.3 * i, 0.3 * i + 0.28) for i in range(400))
+    looked = []
+    monkeypatch.setattr(
+        module, "smoothed", lambda levels: looked.append(len(levels)) or smoothed(levels)
+    )
+    growing = GrowingAccents()
+    for known in range(0, 12_000, 10):
+        found = growing.up_to(words[: known // 20], level[:known], False)
+        for _ in range(3):
+            assert growing.up_to(words[: known // 20], level[:known], False) == found
+    assert max(looked) < 600  # frames: the sound of some seconds, never all of it
+    assert growing.up_to(words, level, True) == accents(words, level, True)
 
 
 def test_silence_has_no_accents():

@@ -9,7 +9,7 @@ from ico3d.chat.performing.cueing import LEAD, SOONEST, Cueing
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import SPEECH_RATE, Clock, Cues
 from ico3d.motion.clip import Clip, Marks
-from ico3d.motion.composing.composer import BEATS
+from ico3d.motion.composing.composer import BEATS, Composer
 from ico3d.motion.curves import Curve
 from ico3d.rig.quaternions import from_rotvec
 
@@ -154,3 +154,18 @@ def test_a_speech_that_nothing_is_known_of_is_left_alone():
         cueing = Cueing(CLIPS, page, True, 3)
         heard(cueing, page, until=0.3)
         cueing.request("somersault")
+
+
+def test_reports_in_a_flood_are_looked_at_ten_times_a_second(monkeypatch):
+    looked, directions = [], Composer.directions
+    counted = lambda self, until: looked.append(until) or directions(self, until)  # noqa: E731
+    monkeypatch.setattr(Composer, "directions", counted)
+    cueing = Cueing(CLIPS, Recorder(), True, 1)
+    for frame in spoken():
+        cueing.read(frame)
+    for position in np.arange(0, 2, 0.002):
+        cueing.clock(Clock(0, float(position), 0.0), float(position))
+    assert 18 <= len(looked) <= 21
+    cueing.read(UtteranceEndFrame(0, round(SECONDS * SPEECH_RATE)))
+    cueing.clock(Clock(0, 2.0, 0.0), 2.0)
+    assert len(looked) <= 22  # the end changes what is to be done

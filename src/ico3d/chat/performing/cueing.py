@@ -15,6 +15,8 @@ from ico3d.motion.noise import scrambled
 
 LEAD = 0.8
 """Seconds beyond the heard sound for which gestures are decided, so that cues arrive in time."""
+APART = 0.1
+"""Least time in seconds between two reports that are looked at; a page sends one each 0.2 s."""
 SOONEST = 0.15
 """Least time in seconds between the first heard sound of an utterance and a gesture."""
 
@@ -36,6 +38,7 @@ class Cueing:
         self._wanted: list[str] = []
         self._utterance = -1  # the last one that was heard
         self._composer: Composer | None = None  # until all is handed out
+        self._looked = -APART, False  # at which position, and whether all of the sound was known
 
     def stop(self) -> None:
         """Ends the utterance; the page lets the hands come down by itself."""
@@ -82,7 +85,11 @@ class Cueing:
             return
         if message.utterance != self._utterance:
             self._begin(message.utterance, position)
-        if self._composer is not None:
+        before, complete = self._looked
+        if self._composer is not None and (
+            abs(position - before) >= APART or script.complete is not complete
+        ):
+            self._looked = position, script.complete
             self._go_on(self._composer, script, position)
 
     def _go_on(self, composer: Composer, script: Script, position: float) -> None:
@@ -100,6 +107,7 @@ class Cueing:
         self._utterance = utterance
         seed = scrambled(self._seed, utterance)
         self._composer = Composer(self._clips, seed, position + SOONEST)
+        self._looked = position - APART, False
         self._hand_over()
 
     def _hand_over(self) -> None:

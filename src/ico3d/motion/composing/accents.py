@@ -237,24 +237,59 @@ def accents(words: tuple[Word, ...], levels: Array, ended: bool) -> tuple[Accent
         levels: (n,) loudness known so far, dB.
         ended: Whether the utterance has ended, so that no more sound follows.
     """
-    if not len(levels):
-        return ()
-    smooth = smoothed(levels)
-    loudest = _recent_loudest(smooth)
-    rises = np.diff(smooth, prepend=_FLOOR) > 0
-    falls = np.diff(smooth, append=_FLOOR) <= 0
-    peaks = rises & falls & (smooth > loudest - SPOKEN)
-    known = len(levels) * FRAME - (0.0 if ended else SETTLED)
-    found: list[Accent] = []
-    for number, word in enumerate(words):
-        if word.end + _LEANING > known and not ended:
-            break
-        first = max(round((word.begin - _LEANING) / FRAME), 0)
-        last = min(round((word.end + _LEANING) / FRAME), len(levels) - 1)
-        inside = first + np.flatnonzero(peaks[first : last + 1])
-        if len(inside):
-            best = int(inside[np.argmax(smooth[inside])])
-            if not found or best * FRAME > found[-1].time:
-                strength = float(smooth[best] - loudest[best])
-                found.append(Accent(best * FRAME, strength, number))
-    return tuple(found)
+    return GrowingAccents().up_to(words, levels, ended)
+
+
+class GrowingAccents:
+    """Accents of speech that grows: each word is looked at once, however often somebody asks."""
+
+    def __init__(self):
+        """Starts before the first word."""
+        self._found: list[Accent] = []
+        self._next = 0  # the first word that is not looked at yet
+
+    def up_to(self, words: tuple[Word, ...], levels: Array, ended: bool) -> tuple[Accent, ...]:
+        """All accents known so far, as `accents` finds them.
+
+        Args:
+            words: Words in order of time; those of the call before come first.
+            levels: (n,) loudness known so far, dB; that of the call before comes first.
+            ended: Whether the utterance has ended, so that no more sound follows.
+        """
+        if self._next < len(words) and len(levels):
+            earliest = words[self._next].begin - _LEANING - _MEMORY - 3 * _SMOOTH
+            begin = max(int(earliest / FRAME) - 2, 0)
+            peaks = _Peaks(levels[begin:], begin)
+            known = len(levels) * FRAME - (0.0 if ended else SETTLED)
+            for number in range(self._next, len(words)):
+                if words[number].end + _LEANING > known and not ended:
+                    break
+                self._next = number + 1
+                after = self._found[-1].time if self._found else -np.inf
+                self._found += peaks.accent(words[number], number, after)
+        return tuple(self._found)
+
+
+class _Peaks:
+    """Peaks of loudness from a frame on; what lies near the first one may be wrong."""
+
+    def __init__(self, levels: Array, begin: int):
+        """Finds the peaks of levels (n,), of which the first one belongs to the frame `begin`."""
+        self._begin = begin
+        self._smooth = smoothed(levels)
+        self._loudest = _recent_loudest(self._smooth)
+        rises = np.diff(self._smooth, prepend=_FLOOR) > 0
+        falls = np.diff(self._smooth, append=_FLOOR) <= 0
+        self._at = rises & falls & (self._smooth > self._loudest - SPOKEN)
+
+    def accent(self, word: Word, number: int, after: float) -> list[Accent]:
+        """The accent of a word, if it has one after a moment."""
+        first = max(round((word.begin - _LEANING) / FRAME) - self._begin, 0)
+        last = min(round((word.end + _LEANING) / FRAME) - self._begin, len(self._at) - 1)
+        inside = first + np.flatnonzero(self._at[first : last + 1])
+        if not len(inside):
+            return []
+        best = int(inside[np.argmax(self._smooth[inside])])
+        time = (self._begin + best) * FRAME
+        strength = float(self._smooth[best] - self._loudest[best])
+        return [Accent(time, strength, number)] if time > after else []

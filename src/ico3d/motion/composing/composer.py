@@ -8,7 +8,7 @@ or the next gesture needs the hands.
 import numpy as np
 
 from ico3d.motion.clip import Clip, meaning
-from ico3d.motion.composing.accents import FRAME, SPOKEN, Accent, Word, accents
+from ico3d.motion.composing.accents import FRAME, SPOKEN, Accent, GrowingAccents, Word
 from ico3d.motion.composing.cues import (
     BLEND_IN,
     SETTLE,
@@ -71,7 +71,8 @@ class Composer:
         self._words: tuple[Word, ...] = ()
         self._levels: Array = np.zeros(0)
         self._end: float | None = None
-        self._stresses: tuple[Accent, ...] | None = None  # None once more is known of the speech
+        self._accents = GrowingAccents()
+        self._meant: dict[int, str] = {}  # gestures that words call for
         self._handed = start  # time up to which all is decided
         self._next = 0  # index of the first word whose accent is not decided
         self._cues: list[Cue] = []
@@ -86,16 +87,15 @@ class Composer:
         """Updates what is known of the speech.
 
         Args:
-            words: All words known so far, in order of time.
+            words: All words known so far, in order of time; those known before come first.
             levels: (n,) loudness known so far, from the beginning, dB (`accents.loudness`).
         """
-        if words is not self._words or levels is not self._levels:
-            self._words, self._levels, self._stresses = words, levels, None
+        if words is not self._words:
+            self._words, self._meant = words, meanings(words)
+        self._levels = levels
 
     def end(self, seconds: float) -> None:
         """Says that all of the speech is known, and how long it is."""
-        if self._end is None:
-            self._stresses = None
         self._end = seconds
 
     def request(self, name: str) -> None:
@@ -116,10 +116,8 @@ class Composer:
         Later calls return nothing that begins before `until`.
         """
         self._new = []
-        if self._stresses is None:
-            self._stresses = accents(self._words, self._levels, self._end is not None)
-        stresses = self._stresses
-        meant = meanings(self._words)
+        stresses = self._accents.up_to(self._words, self._levels, self._end is not None)
+        meant = self._meant
         self._make_wanted(until, stresses)
         for index, accent in enumerate(stresses):
             if accent.word >= self._next and not self._decide(index, stresses, meant, until):
@@ -139,7 +137,7 @@ class Composer:
             The releases.
         """
         self._new = []
-        self._words, self._wanted, self._stresses = (), [], None
+        self._words, self._wanted, self._accents = (), [], GrowingAccents()
         for cue in list(self._held.values()):
             self._release(cue, max(now, self._earliest(cue)))
         return sorted(self._new, key=_moment)
@@ -301,16 +299,17 @@ class Composer:
         return max(rounded_release(clip, cue, wanted), self._handed)
 
     def _phrase_end(self, time: float) -> float:
-        """Time of the next pause after a time; the end of the known sound if there is none."""
+        """Time of the next pause after a time; if there is none, a later one than matters."""
         first = round(time / FRAME)
         if first >= len(self._levels):
             return time
-        quiet = self._levels[first:] < self._levels.max() - SPOKEN
         run = round(PAUSE / FRAME)
+        last = first + round(LONGEST_HOLD / FRAME) + run  # nobody holds a gesture for longer
+        quiet = self._levels[first:last] < self._levels.max() - SPOKEN
         for i in np.flatnonzero(quiet):
             if quiet[i : i + run].all():
                 return (first + int(i)) * FRAME
-        return len(self._levels) * FRAME
+        return (first + len(quiet)) * FRAME
 
     def _release(self, cue: Cue, time: float) -> None:
         self._new.append(Release(cue.number, time))
