@@ -50,9 +50,9 @@ class Persona:
     @property
     def proposed(self) -> tuple[str, ...]:
         """The questions that are proposed to visitors."""
-        asked = (note.partition("=>")[0] for note in self.notes if "=>" in note)
-        first = (next(filter(None, map(str.strip, one.split("|"))), "") for one in asked)
-        return self.suggestions or tuple(filter(None, first))[:SUGGESTED_NOTES]
+        asked = [note.partition("=>")[0].split("|") for note in self.notes if "=>" in note]
+        worded = [[one.strip() for one in wordings if one.strip()] for wordings in asked]
+        return self.suggestions or tuple(w[0] for w in worded if w)[:SUGGESTED_NOTES]
 
 
 REQUIRED = ("name", "greeting", "notes")
@@ -123,7 +123,7 @@ def check_persona(persona: Persona, where: str) -> None:
     questions = sum(note.partition("=>")[0].count("|") + 1 for note in persona.notes)
     _require(questions <= MAX_NOTES, where, "notes", f"ask at most {MAX_NOTES} questions")
     few = len(persona.suggestions) <= MOST_SUGGESTIONS
-    short = max(map(_letters, persona.suggestions), default=0) <= LONGEST_SUGGESTION
+    short = max([_letters(text) for text in persona.suggestions], default=0) <= LONGEST_SUGGESTION
     what = f"be at most {MOST_SUGGESTIONS} questions of at most {LONGEST_SUGGESTION} letters"
     _require(few and short, where, "suggestions", what)
     _require(all(map(str.strip, persona.suggestions)), where, "suggestions", "not be empty texts")

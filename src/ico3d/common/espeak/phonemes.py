@@ -7,6 +7,7 @@ takes nearly all of the time, stays with the server.
 
 import functools
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -57,16 +58,14 @@ def _ask(request: dict[str, Any]) -> Any:
 @functools.cache
 def _piper(description: Path) -> Any:
     """Piper's voice without its model."""
-    from piper import PiperConfig, PiperVoice
-
-    return PiperVoice(None, PiperConfig.from_dict(json.loads(description.read_bytes())))
+    piper: Any = import_module("piper")
+    return piper.PiperVoice(None, piper.PiperConfig.from_dict(json.loads(description.read_bytes())))
 
 
 @functools.cache
 def _kokoro() -> Any:
-    from kokoro_onnx.tokenizer import Tokenizer
-
-    return Tokenizer()
+    tokenizer: Any = import_module("kokoro_onnx.tokenizer")
+    return tokenizer.Tokenizer()
 
 
 def _answer(request: dict[str, Any]) -> Told:
