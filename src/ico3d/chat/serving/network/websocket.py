@@ -18,6 +18,7 @@ RATE, AT_ONCE = MAX_RATE, 2 * MAX_BURST
 """Pings, pongs and continuations of a second, and at once: each message may come in two pieces."""
 LARGEST_BACKLOG = 1 << 20  # bytes that a peer may leave unread
 LAST_WORDS = 5.0  # s in which a peer may read what was sent before the connection was closed
+PARTING = 0.2  # s in which one that broke the rules may read why
 
 
 class BoundedWebSocket(WebSocketsSansIOProtocol):
@@ -72,6 +73,14 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         """Takes a further piece of a message."""
         if self._may_come():
             super().handle_cont(event)
+
+    def handle_parser_exception(self) -> None:
+        """Closes the connection of a peer that broke the rules.
+
+        By HTTPS it would be heard and decrypted until it agrees that the connection is closed.
+        """
+        super().handle_parser_exception()
+        self.loop.call_later(PARTING, self.transport.abort)
 
     def _parse(self) -> None:
         """Parses what has come, until there is a message."""
