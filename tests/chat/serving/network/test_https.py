@@ -13,7 +13,6 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import Frame, Opcode
 
 from ico3d.chat.serving.network.certificates import own_certificate
-from ico3d.chat.serving.network.websocket import AT_ONCE
 from support.chat.serving import serving, visiting
 
 
