@@ -141,6 +141,17 @@ def test_what_is_no_such_file_is_refused(tmp_path):
             read_body_track(tmp_path, 5, 15.0)
 
 
+def test_a_file_that_claims_much_is_not_read(tmp_path):
+    numbers = 1 << 29  # of which the disk holds nothing
+    entry = {"dtype": "F32", "shape": [numbers], "data_offsets": [0, 4 * numbers]}
+    head = json.dumps({"rotations": entry}).encode()
+    with (tmp_path / NAME).open("wb") as file:
+        file.write(len(head).to_bytes(8, "little") + head)
+        file.truncate(8 + len(head) + 4 * numbers)
+    with pytest.raises(CaptureError, match="it has more than 256 MiB"):
+        read_body_track(tmp_path, 5, 15.0)
+
+
 def test_nothing_is_lost_where_nothing_can_be_written(track, tmp_path):
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(CaptureError, match="cannot be written"):

@@ -19,6 +19,7 @@ from ico3d.rig.rig import Rig
 NAME = "body_track.safetensors"
 """Name of the file in a recording's folder."""
 VERSION = 1
+MOST_BYTES = 1 << 28  # of a file, which two hours of 80 joints take
 """Version of the file."""
 NUMBERS = {"faces": np.dtype(np.int32), "vertex_joints": np.dtype(np.uint8)}
 """Types of the arrays of indices."""
@@ -172,6 +173,8 @@ def _read(file: Path) -> BodyTrack:
     Raises:
         OSError, SafetensorError, or one of `_DAMAGE`: If it is damaged.
     """
+    if file.stat().st_size > MOST_BYTES:
+        raise ValueError(f"it has more than {MOST_BYTES >> 20} MiB")
     with cast(Any, safe_open(file, "numpy")) as content:  # untyped
         text = cast(dict[str, str], content.metadata() or {}).get("body_track", "{}")
         names = cast(list[str], content.keys())
