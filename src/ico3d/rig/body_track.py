@@ -19,8 +19,9 @@ from ico3d.rig.rig import Rig
 NAME = "body_track.safetensors"
 """Name of the file in a recording's folder."""
 VERSION = 1
-MOST_BYTES = 1 << 28  # of a file, which two hours of 80 joints take
 """Version of the file."""
+MOST_BYTES = 1 << 28
+"""Largest size in bytes of a file: two hours of 80 joints take as much."""
 NUMBERS = {"faces": np.dtype(np.int32), "vertex_joints": np.dtype(np.uint8)}
 """Types of the arrays of indices."""
 _DAMAGE = (ValueError, KeyError, TypeError, OverflowError, AttributeError)
