@@ -13,7 +13,7 @@ from ico3d.capture.decoding import DAMAGED, open_picture, unit
 from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
-from ico3d.common.files import MOST_BYTES, json_of, read_small
+from ico3d.common.files import json_of, read_small
 from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
@@ -21,6 +21,8 @@ from ico3d.errors import CaptureError
 FORMAT, VERSION = "ico3d-synthetic", 2
 READABLE = (1, 2)
 """Versions that can be read; version 1 has no field for what is shown and is always a head."""
+LARGEST = 1 << 29
+"""Bytes of the file of frames: an hour of a body's points takes as much."""
 NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
 
 
@@ -159,7 +161,7 @@ class SyntheticCapture(RecordedCapture):
     def _read_frames(self) -> dict[str, np.ndarray]:
         file = self.path / "frames.safetensors"
         try:
-            arrays = load(read_small(file, most=MOST_BYTES))
+            arrays = load(read_small(file, most=LARGEST))
         except (OSError, SafetensorError) as error:
             raise CaptureError(f"{file} is missing or damaged: record again.") from error
         frames, shapes = self.num_frames, len(self._about["blendshape_names"])

@@ -1,5 +1,6 @@
 """The file beside a recording, and what a multiview capture gives from it."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ from safetensors.numpy import load, save
 from ico3d.capture.checking.check import examine
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.formats import open_capture
-from ico3d.capture.headpose.track_file import NAME, HeadTrack
+from ico3d.capture.headpose import track_file
+from ico3d.capture.headpose.track_file import NAME, HeadTrack, read_track
 from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.importing.resizing import resize_capture
 from ico3d.errors import CaptureError
@@ -99,3 +101,15 @@ def test_a_damaged_track_is_one_sentence(folder):
     file.write_bytes(file.read_bytes()[:-40])
     with pytest.raises(CaptureError, match="is damaged: delete it and run ico3d capture track"):
         open_capture(folder)
+
+
+def test_a_track_that_claims_more_than_its_frames_take_is_not_read(folder, monkeypatch):
+    numbers = 1 << 28  # of which the disk holds nothing
+    entry = {"dtype": "F32", "shape": [numbers], "data_offsets": [0, 4 * numbers]}
+    head = json.dumps({"views": entry}).encode()
+    with (folder / NAME).open("wb") as file:
+        file.write(len(head).to_bytes(8, "little") + head)
+        file.truncate(8 + len(head) + 4 * numbers)
+    monkeypatch.setattr(track_file, "load", pytest.fail)
+    with pytest.raises(CaptureError, match="is damaged: delete it"):
+        read_track(folder, 3, 5)

@@ -1,5 +1,6 @@
 """The file of a tracked head, `tracking.safetensors` (docs/captures/multiview.md)."""
 
+import math
 import os
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,7 +12,7 @@ from safetensors.numpy import load, save
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding
 from ico3d.common.expression import EYE_NAMES
-from ico3d.common.files import MOST_BYTES, read_small, write_atomic
+from ico3d.common.files import MOST_NOTES, read_small, write_atomic
 from ico3d.errors import CaptureError
 
 NAME = "tracking.safetensors"
@@ -117,10 +118,6 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
     if not file.is_file():
         return None
     mend = "delete it and run ico3d capture track again"
-    try:
-        arrays = load(read_small(file, most=MOST_BYTES))
-    except (OSError, SafetensorError, ValueError, KeyError) as error:
-        raise CaptureError(f"{file} is damaged: {mend}.") from error
     shapes = {
         "world_from_head": (num_frames, 4, 4),
         "landmarks": (num_frames, 68, 3),
@@ -128,6 +125,11 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
         "blendshapes": (num_frames, len(BLENDSHAPES)),
         "views": (num_frames, num_cameras),
     }
+    most = MOST_NOTES + 8 * sum(map(math.prod, shapes.values()))
+    try:
+        arrays = load(read_small(file, most=most))
+    except (OSError, SafetensorError, ValueError, KeyError) as error:
+        raise CaptureError(f"{file} is damaged: {mend}.") from error
     for name, shape in shapes.items():
         array = arrays.get(name)
         if array is None or array.shape != shape:

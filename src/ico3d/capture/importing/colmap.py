@@ -8,7 +8,7 @@ import numpy as np
 
 from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside, take_once
 from ico3d.capture.lens import Lens
-from ico3d.common.files import MOST_BYTES, read_small
+from ico3d.common.files import MOST_BYTES, check_regular, read_small
 from ico3d.errors import CaptureError
 
 MODELS = {
@@ -21,6 +21,8 @@ MODELS = {
 }
 """Supported camera models: number, name and number of parameters."""
 ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
+LONGEST_LINE = 1 << 24
+"""Letters of a line, of which all points of a picture take one."""
 Pose = tuple[str, int, np.ndarray]
 """Picture's file name, camera's id, and (7,) quaternion wxyz and translation, world to camera."""
 
@@ -113,9 +115,13 @@ def _camera_to_world(numbers: np.ndarray, what: str) -> np.ndarray:
 
 def _lines(file: Path) -> Iterator[str]:
     """Lines of a text file without comments; empty ones count."""
-    for line in read_small(file, most=MOST_BYTES).decode("utf-8").splitlines():
-        if not line.startswith("#"):
-            yield line
+    check_regular(file)
+    with file.open(encoding="utf-8") as opened:
+        while line := opened.readline(LONGEST_LINE):
+            if len(line) == LONGEST_LINE:
+                raise ValueError(f"{file} has a line of more than {LONGEST_LINE} letters")
+            if not line.startswith("#"):
+                yield line
 
 
 def _text_cameras(file: Path) -> dict[int, Lens]:
