@@ -6,6 +6,8 @@ clocks. The page sends with each piece of sound what the loudspeaker was playing
 do not matter. Delay and loudness of the echo are learnt from the sound itself.
 """
 
+from collections import deque
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -27,11 +29,17 @@ CLEAR = 30.0  # how much stronger than its echo and the room a voice is beyond d
 AFTER = 15  # frames for which a voice goes on after the last such frame
 LEARN_EVERY = 10  # frames
 SILENT = 1e-9  # mean square
+BEHIND = 500  # frames for which what was sent is known: 10 s
+UNHEARD = 3000  # frames of sound that wait to be heard: 60 s, and a page is sent 2 s ahead
 ROOM = 3e-7  # mean square of a band; noise of a quiet room
 
 
 class SentSound:
-    """Band energies of the avatar's speech, by utterance and time."""
+    """Band energies of the avatar's speech, by utterance and time.
+
+    Times are asked for in order; what lies more than `BEHIND` frames before the latest one is
+    forgotten.
+    """
 
     def __init__(self):
         """Starts empty."""
@@ -45,26 +53,56 @@ class SentSound:
             self._utterance = utterance
             self._forget()
         self._fresh.append(pcm)
+        self._waiting += len(pcm)
+        self._leave_out(self._waiting - UNHEARD * self._bands.length)
 
     def at(self, utterance: int | None, seconds: float) -> np.ndarray:
         """Energies (COUNT,) around a time of an utterance; 0 in silence (None)."""
         row = int(seconds / FRAME) if utterance == self._utterance else -1
-        if row >= 0 and self._fresh:
-            self._look()
-        return self._rows[row] if 0 <= row < len(self._rows) else np.zeros(COUNT)
+        if row >= self._first + len(self._rows) and self._fresh:
+            self._look(row)
+        index = row - self._first
+        return self._rows[index] if 0 <= index < len(self._rows) else np.zeros(COUNT)
 
-    def _look(self) -> None:
-        """Takes energies of what is new; while no microphone is open nobody needs them."""
-        samples = np.concatenate([self._rest, *self._fresh])
-        self._fresh.clear()
-        whole = len(samples) - len(samples) % self._bands.length
-        self._rest = samples[whole:]
-        self._rows = np.concatenate([self._rows, self._bands.energies(samples[:whole] / 32768)])
+    def _look(self, row: int) -> None:
+        """Takes the energies around a frame; while no microphone is open nobody needs them."""
+        length = self._bands.length
+        self._leave_out((row - BEHIND) * length - self._begin)
+        wanted = (row + 1) * length - self._begin
+        taken, count = [np.zeros(0, np.int16)], 0
+        while self._fresh and count < wanted:
+            taken.append(self._fresh.popleft())
+            count += len(taken[-1])
+        whole = count - count % length
+        samples = np.concatenate(taken)
+        if whole < count:
+            self._fresh.appendleft(samples[whole:])
+        new = self._bands.energies(samples[:whole] / 32768)
+        kept = self._rows[-BEHIND:]
+        self._first = self._begin // length - len(kept)
+        self._rows = np.concatenate([kept, new])
+        self._begin += whole
+        self._waiting -= whole
+
+    def _leave_out(self, samples: int) -> None:
+        """Forgets so many samples that nobody has looked at, but whole frames, and all before."""
+        samples -= samples % self._bands.length
+        if samples <= 0:
+            return
+        samples = min(samples, self._waiting - self._waiting % self._bands.length)
+        self._begin += samples
+        self._waiting -= samples
+        self._rows, self._first = np.zeros((0, COUNT)), self._begin // self._bands.length
+        while samples:
+            piece = self._fresh.popleft()
+            if len(piece) > samples:
+                self._fresh.appendleft(piece[samples:])
+            samples -= min(samples, len(piece))
 
     def _forget(self) -> None:
-        self._rows = np.zeros((0, COUNT))
-        self._rest = np.zeros(0, np.int16)
-        self._fresh: list[np.ndarray] = []
+        self._rows, self._first = np.zeros((0, COUNT)), 0  # energies, and the frame of the first
+        self._fresh: deque[np.ndarray] = deque()  # sound that nobody has looked at
+        self._begin = self._waiting = 0  # its first sample, and how many there are
 
 
 class EchoGuard:
