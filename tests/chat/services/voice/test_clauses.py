@@ -20,7 +20,7 @@ from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
 from ico3d.bundle.persona import Persona
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import espeak
-from ico3d.chat.services.voice.clauses import ClauseProcessor, Clauses
+from ico3d.chat.services.voice.clauses import MOST_LETTERS, ClauseProcessor, Clauses
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.common.espeak.speech import synthesize
 
@@ -169,6 +169,17 @@ async def test_a_text_at_which_the_rules_panic_is_said_all_the_same(space):
     rest = await clauses.flush()
     assert rest is not None
     assert "".join("".join([*pieces, rest.text]).split()) == "".join(text.split())
+
+
+@pytest.mark.parametrize("text", ["m", "XA", "あא", "a'", "(a", "🙂", "word ", "1. "])
+async def test_no_piece_is_longer_than_people_write(text):
+    answer = text * (4000 // len(text))
+    begun = time.process_time()
+    pieces = [piece for piece, _ in await cut(answer)]
+    assert time.process_time() - begun < 1.0  # 1.5 s on an idle machine before
+    assert max(map(len, pieces)) <= MOST_LETTERS + 1
+    assert "".join("".join(pieces).split()) == "".join(answer.split())
+    assert all(piece.endswith("word") for piece in pieces[1:-1]) or text != "word "
 
 
 @pytest.mark.parametrize("blank", [" ", "_", "- ", "、", "，", ", ", "\u0e31 ", "、」"])

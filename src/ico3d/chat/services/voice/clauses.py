@@ -21,6 +21,7 @@ from ico3d.chat.services.voice.markup import EMOJI
 LEAST_WORDS = 2  # of a clause: a single word sounds torn off, and is over before more has come
 LEAST_LETTERS = 4  # the same for scripts without spaces
 MOST_WORDS = 12  # after which the first piece ends between two words, clause or not
+MOST_LETTERS = 400  # of a piece: for each letter all that is left before it is looked at
 UNMARKED_LETTERS = 40  # after which a space ends a sentence of a script that has no full stop
 
 _CLOSER = r"[\"'”’»)\]*_`」』）】]"
@@ -93,6 +94,9 @@ class Clauses(SimpleTextAggregator):
             return await self._cut(len(self._rest))
         self._rest += char
         text = self._rest
+        if len(text) > MOST_LETTERS:
+            spaces = (at for at, letter in enumerate(text, 1) if letter.isspace())
+            return await self._cut(max(spaces, default=len(text)))
         if _EMOJI.fullmatch(char) or not await self._is_worth_a_look():
             return None
         sentence = await sentence_end(self, char)
