@@ -11,6 +11,7 @@ from ico3d.chat.services import chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
 from ico3d.chat.services.voice.base import STARVED
+from ico3d.chat.services.voice.portions import MOST
 from ico3d.chat.settings.conversation import Choice
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.espeak.speech import synthesize
@@ -228,6 +229,19 @@ async def test_piper_is_resampled_without_a_click_or_a_loss(say, piper_files):
     np.testing.assert_allclose(one[100:-100] / level, ideal[100:-100], atol=0.02)
     two, _ = await say(piper.make(settings, None), "Hello there.", "Hello there.")
     np.testing.assert_allclose(two, np.concatenate([one, one]), atol=3)  # no trace of the other
+
+
+async def test_piper_speaks_a_long_text_portion_by_portion(say, piper_files, monkeypatch):
+    pytest.importorskip("piper")
+    spoken = []
+    monkeypatch.setattr(piper, "of_piper", lambda _, text: spoken.append(text) or [list("abc")])
+    piper.engine.cache_clear()
+    text = "\ufdfa" * 100 + " and a word " * 60  # the former is read as eighteen letters
+    pcm, errors = await say(piper.make(piper.Settings("en_US-tone-low"), None), text)
+    piper.engine.cache_clear()
+    assert not errors and len(pcm) > 1000
+    assert max(map(len, spoken)) <= MOST and "".join(spoken).split() == text.split()
+    assert max(one.count("\ufdfa") for one in spoken) == MOST // 18
 
 
 def test_piper_says_what_is_missing(piper_files):

@@ -1,15 +1,18 @@
 """Kokoro through pipecat's own service: 82 million parameters, on the CPU, nine languages."""
 
 import functools
+from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pipecat.audio.utils import create_stream_resampler
+from pipecat.frames.frames import Frame
 from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.services.provider import Context, lacks_package, lacks_weights
 from ico3d.chat.services.voice.base import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.chat.services.voice.portions import portions
 from ico3d.common.espeak.phonemes import of_kokoro
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingExtraError, SettingsError
@@ -89,6 +92,12 @@ def make(settings: Settings, context: Context) -> TTSService:
             )
             TTSService.__init__(self, settings=own, **SYNCHRONOUS, **OPTIONS)
             self._kokoro, self._resampler = model, create_stream_resampler()
+
+        async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
+            """Yields the sound of a text, portion by portion."""
+            for portion in portions(text):
+                async for frame in super().run_tts(portion, context_id):
+                    yield frame
 
     with LOADING:
         model = engine(model_of("kokoro"))

@@ -20,6 +20,7 @@ from ico3d.chat.frames import PhonemesFrame
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.base import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.chat.services.voice.phonemes import timed
+from ico3d.chat.services.voice.portions import portions
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.espeak.phonemes import of_piper
 from ico3d.common.espeak.speech import Phoneme
@@ -92,16 +93,17 @@ def make(settings: Settings, context: Context) -> TTSService:
 
         async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
             """Yields speech sounds and sound, also the 20 ms that a resampler would keep."""
-            await self._resampler.reset()  # the piece before may have been interrupted
-            telling: Any = Telling(self._model)  # one each: a piece before may still be on its way
-            self._voice = telling
-            async for frame in super().run_tts(text, context_id):
-                while telling.told:
-                    phonemes, seconds = telling.told.popleft()
-                    yield PhonemesFrame(phonemes, seconds, context_id)
-                yield frame
-            if rest := await self._resampler.flush():
-                yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
+            for portion in portions(text):
+                await self._resampler.reset()  # the piece before may have been interrupted
+                telling: Any = Telling(self._model)  # one each: one before may be on its way
+                self._voice = telling
+                async for frame in super().run_tts(portion, context_id):
+                    while telling.told:
+                        phonemes, seconds = telling.told.popleft()
+                        yield PhonemesFrame(phonemes, seconds, context_id)
+                    yield frame
+                if rest := await self._resampler.flush():
+                    yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
 
     with LOADING:
         return PiperVoice(engine(find_voice(settings), settings.cuda))
