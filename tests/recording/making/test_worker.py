@@ -115,7 +115,7 @@ def test_a_making_that_takes_more_than_is_free_ends_with_a_sentence(person, tmp_
         start_new_session=True,
     )
     try:
-        assert process.wait(120) == 1
+        assert process.wait(120) == 1 and process.stdout is not None
         assert process.stdout.read() == b"and so does torch\n"
     finally:
         stop(process)
