@@ -64,16 +64,20 @@ TOGETHER = {
     "motion/recorded/test_cutting.py": "gestures",
     "motion/test_composing.py": "gestures",
     "motion/test_gestures.py": "gestures",
+    "scripts/test_fuzz.py": "transformers",
     "speech/test_hubert.py": "transformers",
     "speech/test_training.py": "transformers",
+    "splat/test_files_fuzz.py": "transformers",
+    "splat/test_files_other.py": "transformers",
+    "splat/test_files_ply.py": "transformers",
     "splat/test_primitive.py": "transformers",
     "training/test_acceleration.py": "transformers",
     "training/test_optimiser.py": "transformers",
 }
 """Files that one process runs, because of what they share.
 
-That is transformers, or the compiler of torch which transformers and torch.optim import: both take
-seconds; or all gestures of a person, which take a second to be made.
+That is transformers, or the compiler of torch which transformers, torch.optim and gsply import:
+both take seconds; or all gestures of a person, which take a second to be made.
 """
 
 

@@ -6,7 +6,10 @@ import pytest
 from ico3d.studio.person.growing.skull import Skull
 from ico3d.studio.person.strands import bound, joined
 from ico3d.studio.person.subject import Material
-from ico3d.studio.picture.fibres import draw_strands, far_to_near, strand_colors
+from ico3d.studio.picture.fibres import draw_strands, far_to_near, lit_strands, shown, strand_colors
+from ico3d.studio.picture.lamps import STUDIOS
+from ico3d.studio.picture.lighting import lights_on
+from ico3d.studio.picture.shadows import BUST
 from ico3d.studio.picture.textures import noise, slope
 
 TRIANGLE = np.array([[0.0, 0, 0], [0.01, 0, 0], [0.003, 0.012, 0]], np.float32)
@@ -57,7 +60,7 @@ def _drawn(start, end, width, hidden=0.0, size=16):
     screen = np.array([[*start, 1.0], [*end, 1.0]], np.float32)
     picture = np.zeros((size, size, 4), np.float32)
     nearest = np.full((3 * size, 3 * size), hidden, np.float32)
-    order = far_to_near(screen[:, 2], np.array([0, 2]))
+    order = far_to_near(screen[:, 2], shown(screen, np.array([0, 2], np.int32), nearest, 3))
     light = np.array([[0.2, 0.4, 0.6]] * 2, np.float32)
     draw_strands(order, screen, np.full(2, width, np.float32), light, nearest, 3, picture)
     return picture
@@ -78,9 +81,42 @@ def test_what_lies_behind_a_surface_is_hidden():
     assert _drawn((2.0, 7.5), (12.0, 9.5), 0.5, hidden=0.5).max() > 0.5
 
 
+def _screen(*nearness):
+    """Points in the middle of a picture of 16 × 16 pixels."""
+    return np.array([(8.0, 8.0, near) for near in nearness], np.float32)
+
+
 def test_segments_come_from_far_to_near_and_never_join_two_strands():
-    order = far_to_near(np.array([3.0, 3.0, 1.0, 1.0, 2.0, 0.0]), np.array([0, 2, 4, 6]))
-    assert order.tolist() == [2, 0]
+    screen, first = _screen(3.0, 3.0, 1.0, 1.0, 2.0, 0.0), np.array([0, 2, 4, 6], np.int32)
+    begins = shown(screen, first, np.zeros((48, 48), np.float32), 3)
+    assert far_to_near(screen[:, 2], begins).tolist() == [2, 0]
+
+
+def test_segments_well_behind_a_surface_are_left_out():
+    screen, surface = _screen(1.0, 1.0, 2.1, 2.1, 1.0, 1.0, 1.0), np.full((48, 48), 2.0, np.float32)
+    begins = shown(screen, np.array([0, 7], np.int32), surface, 3)
+    assert np.flatnonzero(begins).tolist() == [1, 2, 3]
+
+
+def test_what_is_left_out_changes_no_light_of_the_rest():
+    random = np.random.default_rng(4)
+    points = random.normal(0, 0.1, (40, 3)).astype(np.float32)
+    first, even = np.array([0, 20, 40], np.int32), np.ones(40, np.float32)
+    lights = lights_on(
+        points, np.arange(39, dtype=np.int32).reshape(-1, 3), np.arange(13, dtype=np.int32),
+        np.eye(4), STUDIOS["studio"], BUST,
+    )  # fmt: skip
+    colors, eye = np.full((2, 3), 0.3, np.float32), np.array([0, 0, 1.0], np.float32)
+
+    def lit(begins):
+        return lit_strands(points, first, begins, even, even[:2], colors, eye * 0, eye, lights)
+
+    some = random.uniform(size=40) < 0.3
+    some[[19, 39]] = False
+    used = some | np.roll(some, 1)
+    whole, part = lit(np.ones(40, bool)), lit(some)
+    np.testing.assert_array_equal(part[used], whole[used])
+    assert used.any() and whole[used].min() > 0
 
 
 def test_brows_and_lashes_are_darker_than_hair():

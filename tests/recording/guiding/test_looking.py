@@ -25,8 +25,8 @@ def blind(tmp_path, monkeypatch):
 
 @pytest.fixture
 def costly(tmp_path, monkeypatch):
-    """A film of 150 kB that would take half a minute of processor time, where one second is had."""
-    monkeypatch.setattr(looking, "SECONDS", 1.0)
+    """A film of 150 kB that would take half a minute of processor time, where a second is had."""
+    monkeypatch.setattr(looking, "SECONDS", 0.5)  # or what is left of a second
     monkeypatch.setattr(looking, "SECONDS_PER_MEGABYTE", 0.0)
     write_empty_pictures(tmp_path / "costly.mkv", 400)
     assert (tmp_path / "costly.mkv").stat().st_size < 160_000

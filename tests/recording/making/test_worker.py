@@ -89,24 +89,34 @@ def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
     assert looks == [("medium", "recorded")] * 2 + [("sturdy", "wine")]
 
 
-@pytest.mark.parametrize("library", ["numpy", "torch"])
-def test_a_making_that_takes_more_than_is_free_ends_with_a_sentence(person, tmp_path, library):
-    """In a process of its own, whose limit would stay."""
+def test_a_making_that_takes_more_than_is_free_ends_with_a_sentence(person, tmp_path):
+    """Whichever library asks for it; in a process of its own, whose limit would stay."""
     _recorded(person, tmp_path, "consent", "text-1")
     code = (
-        "import sys\n"
-        f"import {library} as library\n"
+        "import contextlib, pathlib, sys\n"
+        "import numpy, torch\n"
         "from ico3d.recording.making import worker\n"
+        "from ico3d.recording.making.progress import read_progress\n"
         "worker.LEAST_BYTES, worker.free_memory = 64 << 20, lambda: 256 << 20\n"
-        "worker.create = lambda settings, tell: library.ones(1 << 28)\n"
         f"sys.argv = ['worker', {str(person.folder)!r}, 'quick']\n"
+        "worker.create = lambda settings, tell: numpy.ones(1 << 28)\n"
+        "with contextlib.suppress(MemoryError):\n"
+        "    worker.main()\n"
+        f"found = read_progress(pathlib.Path({str(Places(person.folder).folder)!r}))\n"
+        "assert (found.state, found.code) == ('failed', 'memory')\n"
+        "worker.create = lambda settings, tell: torch.ones(1 << 28)\n"
+        "print('and so does torch', flush=True)\n"
         "worker.main()"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, start_new_session=True
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
     )
     try:
-        assert process.wait(120) == 1
+        assert process.wait(120) == 1 and process.stdout is not None
+        assert process.stdout.read() == b"and so does torch\n"
     finally:
         stop(process)
     found = read_progress(Places(person.folder).folder)

@@ -1,5 +1,6 @@
 """The packaged avatar as a head without landmarks, and recorded as a whole in another studio."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +38,9 @@ POSED[:3, :3] = Rotation.from_euler("xyz", (10, -20, 5), degrees=True).as_matrix
 POSED[:3, 3] = 0.01, 0.03, -0.02
 
 
+@cache
 def demo() -> BakedAvatar:
-    """The packaged avatar."""
+    """The packaged avatar, read once in a process."""
     return BakedAvatar.of(Bundle.open(packaged.FILE))
 
 
@@ -66,6 +68,28 @@ def saved(head: TrainedHead, folder: Path) -> Assembly:
     return Assembly(folder, plain, settings_for("cpu", "swings++"), 0)
 
 
+def _head_at(frame: int) -> np.ndarray:
+    """(4, 4) rigid, from the space of the demo's head to the world."""
+    first = round(MOMENTS[frame] * demo().fps)
+    return demo().world_from_head[first].astype(np.float64)
+
+
+def _camera(azimuth: float, name: str) -> Camera:
+    """One that looks at the head, from so many degrees at its side."""
+    middle, focal = _head_at(0)[:3, 3], HEIGHT * AWAY / WIDE
+    intrinsics = np.array([[focal, 0, WIDTH / 2], [0, focal, HEIGHT / 2], [0, 0, 1]])
+    way = np.array([np.sin(np.radians(azimuth)), 0.1, np.cos(np.radians(azimuth))])
+    return Camera(WIDTH, HEIGHT, intrinsics, look_at(middle + AWAY * way, middle), name)
+
+
+@cache
+def _taken(azimuth: float, frame: int) -> np.ndarray:
+    """(H, W, 3) what a camera sees before a wall."""
+    rest = np.zeros(demo().head.expression_size, np.float32)
+    person, wall = demo().gaussians(MOMENTS[frame], rest), torch.tensor([0.5, 0.6, 0.7])
+    return photograph(person, _camera(azimuth, ""), wall)[0].clip(0, 1)
+
+
 class FilmedDemo(Capture):
     """Cameras in front of the demo's face; nobody has marked it."""
 
@@ -75,24 +99,13 @@ class FilmedDemo(Capture):
 
     def __init__(self, path: Path, azimuths=AZIMUTHS):
         self.path = path
-        self._person = demo()
-        self._rest = np.zeros(self._person.head.expression_size, np.float32)
-        middle = self.true_world_from_head(0)[:3, 3]
-        focal = HEIGHT * AWAY / WIDE
-        intrinsics = np.array([[focal, 0, WIDTH / 2], [0, focal, HEIGHT / 2], [0, 0, 1]])
-        ways = [(np.sin(a), 0.1, np.cos(a)) for a in np.radians(azimuths)]
-        self.cameras = tuple(
-            Camera(
-                WIDTH, HEIGHT, intrinsics, look_at(middle + AWAY * np.array(way), middle), str(i)
-            )
-            for i, way in enumerate(ways)
-        )
+        self._azimuths = azimuths
+        self.cameras = tuple(_camera(azimuth, str(i)) for i, azimuth in enumerate(azimuths))
         self.split = all_frames(self.num_frames, self.cameras)
 
     def true_world_from_head(self, frame: int) -> np.ndarray:
         """(4, 4) rigid, of the demo's head."""
-        first = round(MOMENTS[frame] * self._person.fps)
-        return self._person.world_from_head[first].astype(np.float64)
+        return _head_at(frame)
 
     def world_from_head(self, frame: int) -> np.ndarray:
         """What the recording says: in another canonical space."""
@@ -100,9 +113,7 @@ class FilmedDemo(Capture):
 
     def image(self, camera: int, frame: int) -> np.ndarray:
         """(H, W, 3) before a wall."""
-        person = self._person.gaussians(MOMENTS[frame], self._rest)
-        wall = torch.tensor([0.5, 0.6, 0.7])
-        return photograph(person, self.cameras[camera], wall)[0].clip(0, 1)
+        return _taken(self._azimuths[camera], frame).copy()
 
 
 def away(capture: FilmedDemo, folder: Path) -> float:

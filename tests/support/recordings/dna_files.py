@@ -153,8 +153,8 @@ def write_annotations(file: h5py.File, rig: Rig) -> None:
         data = encoded(mask(camera, rig.size(camera)), "PNG")
         masks = file.create_group(f"Mask/{camera}/mask")
         masks.create_dataset("0", data=data)
-        for frame in range(1, rig.frames):
-            masks[str(frame)] = masks["0"]  # a hard link: the person stands still
+        for frame in range(1, rig.frames):  # the person stands still
+            masks.id.links.create_hard(str(frame).encode(), masks.id, b"0")
         file[f"Keypoints_2D/{camera:02d}"] = keypoints_2d(rig, camera)
     points = keypoints_3d(rig.frames) if rig.keypoints is None else rig.keypoints
     file["Keypoints_3D/keypoints3d"] = points

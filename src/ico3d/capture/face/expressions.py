@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ico3d.capture.capture import EYE_NAMES
+from ico3d.common.savitzky_golay import filtered
 
 # fmt: off
 BLENDSHAPES = (
@@ -45,7 +46,5 @@ def eyes_of_action_units(units: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def smoothed(values: np.ndarray) -> np.ndarray:
     """Savitzky-Golay filter (5, 3) along the first axis, result limited to [0, 1]; float32."""
-    from scipy.signal import savgol_filter
-
-    calm = savgol_filter(values, 5, 3, axis=0) if len(values) >= 5 else values
+    calm = filtered(values, 5, 3) if len(values) >= 5 else values
     return np.clip(np.asarray(calm), 0, 1).astype(np.float32)

@@ -9,6 +9,8 @@ frame rates are treated alike.
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from ico3d.common.savitzky_golay import shares_of
+
 WINDOW = 0.3
 """Window of the filter for poses in seconds; heads do not shake faster."""
 DEGREE = 2
@@ -72,18 +74,9 @@ def smoothed_poses(poses: np.ndarray, fps: float) -> np.ndarray:
     for frame in range(count):
         first = min(max(frame - window // 2, 0), count - window)
         part = poses[first : first + window]
-        shares = _shares(window, frame - first)
+        shares = shares_of(window, frame - first, DEGREE)
         own = Rotation.from_matrix(poses[frame, :3, :3])
         around = (own.inv() * Rotation.from_matrix(part[:, :3, :3])).as_rotvec()  # (window, 3)
         smooth[frame, :3, :3] = (own * Rotation.from_rotvec(shares @ around)).as_matrix()
         smooth[frame, :3, 3] = shares @ part[:, :3, 3]
     return smooth
-
-
-def _shares(window: int, place: int) -> np.ndarray:
-    """(window,) what each frame contributes to the parabola through all of them at one place.
-
-    These are `scipy.signal.savgol_coeffs`, whose module takes most of a second to import.
-    """
-    times = np.arange(window) - place
-    return np.linalg.pinv(np.vander(times, DEGREE + 1, increasing=True))[0]

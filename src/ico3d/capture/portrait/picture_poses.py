@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.capture.portrait import rigid_head
 from ico3d.capture.portrait.rigid_head import Track
+from ico3d.common.savitzky_golay import filtered
 
 REFERENCES = 8
 """Number of reference frames, spread over the head poses of the clip."""
@@ -74,11 +75,9 @@ def _smooth(rotations: np.ndarray) -> np.ndarray:
     window, degree = SMOOTHING
     if len(rotations) < window:
         return rotations
-    from scipy.signal import savgol_filter  # takes long to import
-
     middle = Rotation.from_matrix(rotations).mean()
     turns = (middle.inv() * Rotation.from_matrix(rotations)).as_rotvec()  # (F, 3)
-    smooth = savgol_filter(turns, window, degree, axis=0)
+    smooth = filtered(turns, window, degree)
     return (middle * Rotation.from_rotvec(smooth)).as_matrix()
 
 

@@ -129,7 +129,8 @@ def _follow(state, velocity, pins, ends, masses, pairs, lengths, compliance, rad
         old = state.copy()
         for i in range(state.shape[0]):
             if i < pinned:
-                state[i] = pins[s, i]
+                for axis in range(3):  # rows as a whole would take ten times as long to compile
+                    state[i, axis] = pins[s, i, axis]
                 continue
             for axis in range(3):
                 velocity[i, axis] *= kept

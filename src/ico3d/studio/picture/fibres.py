@@ -23,7 +23,32 @@ SAMPLE_BIAS = 0.0012
 
 
 @kernel()
-def lit_strands(points, first, open_, tone, colors, centre, camera, lights):
+def shown(screen, first, nearest, factor):
+    """Whether a segment that is to be drawn begins at each point, (M,) bool.
+
+    It lies in front of the camera, and not well behind a surface: half of all hair does.
+
+    Args:
+        screen: (M, 3) float32 from `to_screen` with one sample per pixel.
+        first: (N + 1,) int32 `Strands.first`.
+        nearest: (H·factor, W·factor) float32 nearness of the surfaces.
+        factor: Samples of `nearest` along the side of a pixel.
+    """
+    out = np.zeros(screen.shape[0], np.bool_)
+    for s in range(first.shape[0] - 1):
+        for a in range(first[s], first[s + 1] - 1):
+            b = a + 1
+            if screen[a, 2] <= 0.0 or screen[b, 2] <= 0.0:
+                continue
+            out[a] = not (
+                _covered(nearest, screen[a, 0], screen[a, 1], factor, screen[a, 2])
+                and _covered(nearest, screen[b, 0], screen[b, 1], factor, screen[b, 2])
+            )
+    return out
+
+
+@kernel()
+def lit_strands(points, first, begins, open_, tone, colors, centre, camera, lights):
     """Light that points of strands send to a camera (Kajiya-Kay with two shifted highlights).
 
     The first highlight has the colour of the lamp and is shifted towards the root by the scales of
@@ -33,6 +58,7 @@ def lit_strands(points, first, open_, tone, colors, centre, camera, lights):
     Args:
         points: (M, 3) float32 canonical head space, metres.
         first: (N + 1,) int32 `Strands.first`.
+        begins: (M,) bool from `shown`.
         open_: (M,) float32 `Strands.open`.
         tone: (N,) float32 `Strands.tone`.
         colors: (N, 3) float32 albedo of each strand.
@@ -41,15 +67,20 @@ def lit_strands(points, first, open_, tone, colors, centre, camera, lights):
         lights: Lights of the frame.
 
     Returns:
-        (M, 3) float32 linear light.
+        (M, 3) float32 linear light; 0 at points of no segment that is shown.
     """
-    out = np.empty(points.shape, np.float32)
+    out = np.zeros(points.shape, np.float32)
     seen = np.zeros(3)
     for s in range(first.shape[0] - 1):
         begin, end = first[s], first[s + 1]
         shift = 0.03 * math.sin(12.9898 * s)
         red, green, blue = colors[s, 0] * tone[s], colors[s, 1] * tone[s], colors[s, 2] * tone[s]
         for m in range(begin, end):
+            # Shadows are soft: every second point looks them up, in turn between neighbours.
+            fresh = m == begin or (m + s) % 2 == 0
+            lends = fresh and m + 1 < end and begins[m + 1]
+            if not (begins[m] or (m > begin and begins[m - 1]) or lends):
+                continue
             before, after = max(begin, m - 1), min(end - 1, m + 1)
             tx = points[after, 0] - points[before, 0]
             ty = points[after, 1] - points[before, 1]
@@ -63,8 +94,6 @@ def lit_strands(points, first, open_, tone, colors, centre, camera, lights):
             free = open_[m]
             ar, ag, ab = ambient(lights, (nx, ny, nz))
             r, g, b = 0.75 * free * ar * red, 0.75 * free * ag * green, 0.75 * free * ab * blue
-            # Shadows are soft: every second point looks them up, in turn between neighbours.
-            fresh = m == begin or (m + s) % 2 == 0
             sin_v = tx * vx + ty * vy + tz * vz
             for i in range(3):
                 to = lights.directions[i]
@@ -100,17 +129,14 @@ def _unit(x, y, z):
     return x * length, y * length, z * length
 
 
-def far_to_near(nearness: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """First points of the segments in front of the camera, the farthest first.
+def far_to_near(nearness: np.ndarray, begins: np.ndarray) -> np.ndarray:
+    """First points of the segments that are shown, the farthest first.
 
     Args:
-        nearness: (M,) 1/z of the points; 0 behind the camera.
-        first: (N + 1,) `Strands.first`.
+        nearness: (M,) 1/z of the points.
+        begins: (M,) bool from `shown`.
     """
-    inner = np.ones(len(nearness), bool)
-    inner[first[1:] - 1] = False
-    inner[:-1] &= (nearness[:-1] > 0) & (nearness[1:] > 0)
-    start = np.flatnonzero(inner)
+    start = np.flatnonzero(begins)
     return start[np.argsort(nearness[start], kind="stable")].astype(np.int32)
 
 
@@ -132,10 +158,6 @@ def draw_strands(order, screen, width, light, nearest, factor, picture):
         a = order[index]
         b = a + 1
         ax, ay, bx, by = screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1]
-        if _covered(nearest, ax, ay, factor, screen[a, 2]) and _covered(
-            nearest, bx, by, factor, screen[b, 2]
-        ):
-            continue
         dx, dy = bx - ax, by - ay
         square = dx * dx + dy * dy
         if square < 1e-8:
@@ -245,10 +267,11 @@ def overlay(
         lights: Lights of the frame.
     """
     screen = to_screen(points, camera, 1)  # (M, 3)
-    order = far_to_near(screen[:, 2], strands.first)
+    begins = shown(screen, strands.first, nearest, factor)
+    order = far_to_near(screen[:, 2], begins)
     eye = camera.camera_to_world[:3, 3].astype(np.float32)
     light = lit_strands(
-        points, strands.first, strands.open, strands.tone, colors, MIDDLE, eye, lights
+        points, strands.first, begins, strands.open, strands.tone, colors, MIDDLE, eye, lights
     )
     width = (strands.radius * screen[:, 2] * camera.intrinsics[0, 0]).astype(np.float32)
     draw_strands(order, screen, width, light, nearest, factor, picture)

@@ -85,20 +85,25 @@ def from_data(purpose: str, read: Callable[[Path], T]) -> T:
 
 def read_base(folder: Path) -> BaseMesh:
     """Reads the base mesh from the data folder."""
-    vertices, texture, quads, group = [], [], {}, ""
+    lines: dict[str, list[str]] = {"v": [], "vt": []}
+    corners: dict[str, list[str]] = {}
+    group = ""
     for line in (folder / "mpfb2" / "3dobjs" / "base.obj").read_text().splitlines():
         word, _, rest = line.partition(" ")
-        if word == "v":
-            vertices.append([float(x) for x in rest.split()])
-        elif word == "vt":
-            texture.append([float(x) for x in rest.split()[:2]])
+        if word in lines:
+            lines[word].append(rest)
         elif word == "g":
             group = rest.strip()
         elif word == "f":
-            quad = [[int(i) - 1 for i in corner.split("/")[:2]] for corner in rest.split()]
-            quads.setdefault(group, []).append(quad)
-    arrays = {name: np.array(some) for name, some in quads.items()}
-    return BaseMesh(np.array(vertices), np.array(texture), arrays)
+            corners.setdefault(group, []).append(rest.replace("/", " "))
+    vertices, texture = (np.loadtxt(some, ndmin=2) for some in lines.values())
+    quads = {name: _quads(some) for name, some in corners.items()}
+    return BaseMesh(vertices, texture[:, :2], quads)
+
+
+def _quads(lines: list[str]) -> np.ndarray:
+    """(Q, 4, 2) indices of vertex and texture coordinate, from 0, of each face's corners."""
+    return np.loadtxt(lines, int, ndmin=2).reshape(len(lines), 4, -1)[..., :2] - 1
 
 
 def read_target(path: Path, count: int) -> np.ndarray:
