@@ -1,7 +1,6 @@
 """The server of the studio page: who is let in, what is taken, and that deleting is deleting."""
 
 import asyncio
-import copy
 import errno
 import threading
 from datetime import date
@@ -24,6 +23,7 @@ from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import FACE, Progress, write_progress
 from support.needs import needs
 from support.strangers.empty_pictures import write_empty_pictures
+from support.studio_page.looks import look_once
 from support.studio_page.parts import part_file
 
 pytestmark = [needs("av"), pytest.mark.slow]
@@ -38,22 +38,10 @@ def blind(tmp_path, monkeypatch):
     monkeypatch.delenv("ICO3D_MODELS", raising=False)
 
 
-FOUND = {}
-"""Content of a part and its name to what was found in it."""
-
-
 @pytest.fixture(autouse=True)
 def looked_at_once(monkeypatch):
-    """A part that an earlier test of this file had looked at is not looked at again."""
-    look = looking.Looks.report
-
-    async def report(self, file, id):
-        about = file.read_bytes(), id
-        if about not in FOUND:
-            FOUND[about] = await look(self, file, id)
-        return copy.deepcopy(FOUND[about])
-
-    monkeypatch.setattr(looking.Looks, "report", report)
+    """A part that an earlier test had looked at is not looked at again."""
+    look_once(monkeypatch)
 
 
 @pytest.fixture
