@@ -14,6 +14,7 @@ from ico3d.rig.binding import Binding
 from ico3d.rig.body_track import NAME, BodyTrack, read_body_track, track_file, write_body_track
 from ico3d.rig.quaternions import from_rotvec
 from ico3d.rig.rig import Rig
+from support.strangers.claimed import write_claim
 
 RIG = Rig(("root", "arm"), (-1, 0), np.array([[0, 1, 0], [0.2, 1, 0.0]]))
 
@@ -142,12 +143,7 @@ def test_what_is_no_such_file_is_refused(tmp_path):
 
 
 def test_a_file_that_claims_much_is_not_read(tmp_path):
-    numbers = 1 << 29  # of which the disk holds nothing
-    entry = {"dtype": "F32", "shape": [numbers], "data_offsets": [0, 4 * numbers]}
-    head = json.dumps({"rotations": entry}).encode()
-    with (tmp_path / NAME).open("wb") as file:
-        file.write(len(head).to_bytes(8, "little") + head)
-        file.truncate(8 + len(head) + 4 * numbers)
+    write_claim(tmp_path / NAME, "rotations", 1 << 29)
     with pytest.raises(CaptureError, match="it has more than 256 MiB"):
         read_body_track(tmp_path, 5, 15.0)
 

@@ -1,6 +1,5 @@
 """The file beside a recording, and what a multiview capture gives from it."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.importing.resizing import resize_capture
 from ico3d.errors import CaptureError
 from support.recordings import multiview_folders
+from support.strangers.claimed import write_claim
 
 
 @pytest.fixture
@@ -104,12 +104,7 @@ def test_a_damaged_track_is_one_sentence(folder):
 
 
 def test_a_track_that_claims_more_than_its_frames_take_is_not_read(folder, monkeypatch):
-    numbers = 1 << 28  # of which the disk holds nothing
-    entry = {"dtype": "F32", "shape": [numbers], "data_offsets": [0, 4 * numbers]}
-    head = json.dumps({"views": entry}).encode()
-    with (folder / NAME).open("wb") as file:
-        file.write(len(head).to_bytes(8, "little") + head)
-        file.truncate(8 + len(head) + 4 * numbers)
+    write_claim(folder / NAME, "views", 1 << 28)
     monkeypatch.setattr(track_file, "load", pytest.fail)
     with pytest.raises(CaptureError, match="is damaged: delete it"):
         read_track(folder, 3, 5)
