@@ -50,9 +50,14 @@ class Persona:
     @property
     def proposed(self) -> tuple[str, ...]:
         """The questions that are proposed to visitors."""
-        asked = [note.partition("=>")[0].split("|") for note in self.notes if "=>" in note]
-        worded = [[one.strip() for one in wordings if one.strip()] for wordings in asked]
-        return self.suggestions or tuple(w[0] for w in worded if w)[:SUGGESTED_NOTES]
+        asked = [wordings[0] for wordings in map(wordings_of, self.notes) if wordings]
+        return self.suggestions or tuple(asked[:SUGGESTED_NOTES])
+
+
+def wordings_of(note: str) -> tuple[str, ...]:
+    """The wordings of the question that a note answers; none of a fact."""
+    asked, arrow, _ = note.partition("=>")
+    return tuple(one.strip() for one in asked.split("|") if one.strip()) if arrow else ()
 
 
 REQUIRED = ("name", "greeting", "notes")

@@ -123,9 +123,7 @@ export class Connection {
   /** The visitor ends the session; another one may begin. */
   hangUp(): void {
     this.close();
-    this.over = true;
-    this.forget();
-    this.events.ended({ sentence: say('ended'), again: true, wait: null });
+    this.end({ sentence: say('ended'), again: true }, false);
   }
 
   /** Leaves for good. */

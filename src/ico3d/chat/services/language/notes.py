@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ico3d.bundle.persona import Persona
+from ico3d.bundle.persona import Persona, wordings_of
 from ico3d.chat.services.language.index import Index
 from ico3d.common.people.spelling import spelled
 from ico3d.motion.composing.lexicon import requested
@@ -205,11 +205,8 @@ def heard(question: str) -> str:
 
 def parse_note(text: str) -> Note | None:
     """A note from `question | question => answer`; None for other texts."""
-    asked, arrow, answer = text.partition("=>")
-    questions = tuple(q.strip() for q in asked.split("|") if q.strip())
-    if not arrow or not questions or not answer.strip():
-        return None
-    return Note(questions, answer.strip())
+    questions, answer = wordings_of(text), text.partition("=>")[2].strip()
+    return Note(questions, answer) if questions and answer else None
 
 
 def plain(text: str) -> str:
