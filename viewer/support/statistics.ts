@@ -24,3 +24,8 @@ export function correlation(x: number[], y: number[]): number {
   const [a, b] = [centred(x), centred(y)];
   return product(a, b) / Math.sqrt(product(a, a) * product(b, b));
 }
+
+/** Seconds, written as milliseconds. */
+export function ms(seconds: number): string {
+  return `${(1000 * seconds).toFixed(1)} ms`;
+}

@@ -7,7 +7,7 @@ import { finished, makeVoice, openPage, until } from '../../support/browser/talk
 import { runPython } from '../../support/python.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { ChatServer } from '../../support/servers/server.ts';
-import { quantile } from '../../support/statistics.ts';
+import { ms, quantile } from '../../support/statistics.ts';
 
 const SECONDS = 6; // of an answer that are looked at
 const BUSY = 120; // ms of work
@@ -61,8 +61,4 @@ function answer(microphone: Heard[]): Heard[] {
 
 function seconds(chunks: Heard[]): number {
   return chunks.length < 2 ? 0 : (chunks.at(-1)!.sample - chunks[0]!.sample) / MICROPHONE_RATE;
-}
-
-function ms(seconds: number): string {
-  return `${(1000 * seconds).toFixed(1)} ms`;
 }

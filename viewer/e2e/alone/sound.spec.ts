@@ -6,7 +6,7 @@ import { lookAsBundled } from '../../support/browser/pictures.ts';
 import { runPython } from '../../support/python.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { servePage } from '../../support/servers/static.ts';
-import { slope } from '../../support/statistics.ts';
+import { ms, slope } from '../../support/statistics.ts';
 import { comparePlacement, tap } from '../../support/sound/tap.ts';
 
 const RATE = 24_000;
@@ -108,7 +108,3 @@ test('stop is silence within 30 ms, and what comes later of that utterance is dr
   expect(after / RATE).toBeLessThan(0.03);
   expect(await page.evaluate(() => window.ico3d!.conversation!.player.current)).toBeNull();
 });
-
-function ms(seconds: number): string {
-  return `${(1000 * seconds).toFixed(1)} ms`;
-}
