@@ -36,6 +36,8 @@ GESTURES = ("wave", "point", "open_hands", "shrug", "count_three", "nod", "shake
 """To look at: hands, armpits and neck in poses that nobody recorded."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 MAKER = "the authors of ico3d"
+LIGHT = "soft"
+"""What an arm shades in the recording stays dark in every pose: its shade should be faint."""
 TRIED = 2
 """Cameras whose pictures are timed before recording."""
 
@@ -143,13 +145,13 @@ class Demo:
             flush=True,
         )
         who = ("--subject", self.subject, "--seed", self.seed, "--rig", rig)
-        who = (*who, "--no-lively", "--manner", "friendly")
+        who = (*who, "--no-lively", "--manner", "friendly", "--light", LIGHT)
         ico3d("capture synthetic", capture, *who, *shot.words(), *more, "--workers", self.threads)
 
     def _seconds_of_a_picture(self, rig: str, shot: Shot) -> float:
         """Processor time of a picture and its share of what a frame takes, from a few pictures."""
         person = load_subject(str(self.subject), rig == "body")
-        studio = Studio(person, STUDIOS["studio"], "plain")
+        studio = Studio(person, STUDIOS[LIGHT], "plain")
         cameras = cameras_of(person, rig, shot.cameras, shot.size, shot.near)[-TRIED:]
         pose = np.eye(4)
         pose[:3, 3] = person.head_in_world

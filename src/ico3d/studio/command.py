@@ -44,7 +44,7 @@ class Synthetic:
     lively: bool = True
     """Also show moods and glances. Without this the face only speaks, blinks and raises brows,
     which is all that a head driven by speech can know."""
-    light: Literal["studio", "warm"] = "studio"
+    light: Literal["studio", "soft", "warm"] = "studio"
     """Neutral lamps (`studio`), or warm lamps from the other side (`warm`); the light becomes
     part of the recorded colours."""
     motion: Literal["showcase", "talk", "walk", "sway", "repertoire"] = "talk"

@@ -89,6 +89,15 @@ STUDIOS = {
         np.array([0.145, 0.13, 0.12]),
         np.array([0.92, 0.97, 1.06]),
     ),
+    "soft": Lamps(
+        np.array([[-0.74, 0.62, 0.74], [0.85, 0.12, 0.60], [0.66, 0.58, -0.98]]),
+        np.array([[1.25, 1.19, 1.11], [0.50, 0.51, 0.53], [1.10, 1.12, 1.15]]),
+        np.array([0.75, 0.80, 0.50]),
+        np.array([0.34, 0.355, 0.38]),
+        np.array([0.285, 0.295, 0.315]),
+        np.array([0.205, 0.18, 0.17]),
+        np.array([0.92, 0.97, 1.06]),
+    ),
     "warm": Lamps(
         np.array([[0.82, 0.58, 0.60], [-0.80, 0.20, 0.55], [-0.60, 0.62, -0.80]]),
         np.array([[1.95, 1.44, 0.92], [0.18, 0.18, 0.19], [1.05, 0.86, 0.68]]),
@@ -99,4 +108,5 @@ STUDIOS = {
         np.array([1.02, 0.90, 0.76]),
     ),
 }
-"""`studio`: neutral, key light from the person's right; `warm`: like bulbs, from the left."""
+"""`studio`: neutral, key light from the person's right; `soft`: the same through wide cloths, which
+leaves little shade of an arm on a body; `warm`: like bulbs, from the left."""
