@@ -6,7 +6,7 @@ import textwrap
 import pytest
 
 from ico3d.common.espeak import phonemes
-from ico3d.common.espeak.phonemes import of_kokoro, of_piper
+from ico3d.common.espeak.phonemes import MOST, of_kokoro, of_piper
 from ico3d.errors import ServiceError
 
 PIPER = """
@@ -70,6 +70,21 @@ def test_both_voices_ask_another_process(scripted):
     assert of_kokoro("hi", "fr-fr") == "fr-fr:hi"
 
 
+@pytest.mark.parametrize(
+    ("text", "lengths"),
+    [
+        ("a" * (MOST - 1), [MOST]),
+        ("a" * MOST, [MOST, 1]),
+        ("word " * 100, [246, 250, 5]),
+        ("b" * 150 + " " + "c" * 100, [152, 100]),
+    ],
+)
+def test_no_sentence_of_piper_has_thousands_of_phonemes(text, lengths, scripted):
+    pieces = of_piper(scripted, text)  # the scripted one has a phoneme more than letters
+    assert [len(piece) for piece in pieces] == lengths
+    assert sum(pieces, []) == ["en-us", *text]
+
+
 def test_a_text_that_breaks_the_library_is_an_error_and_the_next_one_is_spoken(scripted):
     with pytest.raises(ServiceError, match="espeak-ng failed at a text"):
         of_piper(scripted, "break it")
@@ -90,6 +105,13 @@ def test_texts_that_end_piper_end_nothing_else(text, tmp_path):
     except ServiceError as error:
         assert "failed at a text" in str(error)
     assert "".join(of_piper(description, "Hello.")[0]) == "həlˈoʊ."
+
+
+@pytest.mark.parametrize("text", ["1777 " * 40, "≤ " * 100, "WWWWWWW " * 25])
+def test_few_letters_that_are_read_as_many_words_are_pieces(text, tmp_path):
+    pytest.importorskip("piper")
+    pieces = of_piper(described(tmp_path), text)
+    assert len(pieces) > 4 and max(map(len, pieces)) <= MOST
 
 
 @pytest.mark.parametrize("text", ["i." * 400, "A.\u2029" * 300])

@@ -7,6 +7,7 @@ takes nearly all of the time, stays with the server.
 
 import functools
 import json
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,16 @@ from ico3d.common.espeak.isolated import Isolated, LostError, RefusedError, Told
 from ico3d.errors import ServiceError
 
 LONGEST = 10.0  # s for a piece of an answer; it takes milliseconds
+MOST = 250
+"""Phonemes that Piper speaks at once, about as many as 200 letters of English have. What it takes
+of time and memory grows by the square, and a text of few letters may be read as thousands."""
 
 process = Isolated("ico3d.common.espeak.phonemes", LONGEST)
 """That of this process."""
 
 
 def of_piper(description: Path, text: str) -> list[list[str]]:
-    """The phonemes of each sentence of a text.
+    """The phonemes of each sentence of a text, of long ones in pieces of at most `MOST`.
 
     Args:
         description: The voice's own, the JSON file beside its model.
@@ -30,7 +34,8 @@ def of_piper(description: Path, text: str) -> list[list[str]]:
     Raises:
         ServiceError: If espeak-ng fails at the text.
     """
-    return _ask({"voice": "piper", "description": str(description), "text": text})
+    sentences = _ask({"voice": "piper", "description": str(description), "text": text})
+    return [piece for sentence in sentences for piece in _pieces(sentence)]
 
 
 def of_kokoro(text: str, language: str) -> str:
@@ -44,6 +49,15 @@ def of_kokoro(text: str, language: str) -> str:
         ServiceError: If espeak-ng fails at the text.
     """
     return _ask({"voice": "kokoro", "language": language, "text": text})
+
+
+def _pieces(sentence: list[str]) -> Iterator[list[str]]:
+    """Cuts a sentence behind the last space that fits, or amid a word that is too long."""
+    while len(sentence) > MOST:
+        space = next((at for at in range(MOST, 0, -1) if sentence[at - 1] == " "), MOST)
+        yield sentence[:space]
+        sentence = sentence[space:]
+    yield sentence
 
 
 def _ask(request: dict[str, Any]) -> Any:
