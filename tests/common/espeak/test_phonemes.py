@@ -11,6 +11,10 @@ from ico3d.errors import ServiceError
 
 PIPER = """
     import os
+    from pathlib import Path
+
+    with Path(__file__).with_name("starts").open("a") as starts:
+        starts.write(".")
 
     class PiperConfig:
         @classmethod
@@ -82,13 +86,20 @@ def test_both_voices_ask_another_process(scripted):
 def test_no_sentence_of_piper_has_thousands_of_phonemes(text, lengths, scripted):
     pieces = of_piper(scripted, text)  # the scripted one has a phoneme more than letters
     assert [len(piece) for piece in pieces] == lengths
-    assert sum(pieces, []) == ["en-us", *text]
+    assert [phoneme for piece in pieces for phoneme in piece] == ["en-us", *text]
 
 
 def test_a_text_that_breaks_the_library_is_an_error_and_the_next_one_is_spoken(scripted):
     with pytest.raises(ServiceError, match="espeak-ng failed at a text"):
         of_piper(scripted, "break it")
     assert of_piper(scripted, "a") == [["en-us", "a"]]
+
+
+def test_many_texts_that_break_the_library_start_it_no_second_time(scripted):
+    for _ in range(5):
+        with pytest.raises(ServiceError):
+            of_piper(scripted, "break it")
+    assert scripted.with_name("starts").read_text() == "."
 
 
 def test_what_the_voice_says_of_a_text_is_told(scripted):

@@ -81,6 +81,8 @@ class Isolated:
                 raise
             finally:
                 late.cancel()
+        if "lost" in about:
+            raise LostError
         if "error" in about:
             raise RefusedError(str(about["error"]))
         return about, data
@@ -107,7 +109,8 @@ def serve(answer: Callable[[dict[str, Any]], Told]) -> None:
     """The main loop of a program: reads requests and writes answers until nobody asks any more.
 
     Args:
-        answer: Answers a request; what it raises refuses it.
+        answer: Answers a request; `LostError` says that a process of its own has ended at it, and
+            what else it raises refuses it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it ends it
     tempfile.tempdir = sys.argv[1]
@@ -117,6 +120,8 @@ def serve(answer: Callable[[dict[str, Any]], Told]) -> None:
         (length,) = _LENGTH.unpack(header)
         try:
             about, data = answer(json.loads(asked.read(length)))
+        except LostError:
+            about, data = {"lost": True}, b""
         except Exception as error:
             about, data = {"error": str(error)}, b""
         words = json.dumps(about).encode()

@@ -1,8 +1,8 @@
 """Phonemes for Piper and Kokoro, which have espeak-ng make them.
 
 The library writes beyond a buffer at some texts (`i.` a hundred times is one) and ends its process.
-So that is another one than that of the server, which runs this module; the voice itself, which
-takes nearly all of the time, stays with the server.
+So that is another one than that of the server, which runs this module and works on each text in a
+copy of itself; the voice itself, which takes nearly all of the time, stays with the server.
 """
 
 import functools
@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from ico3d.common.espeak.forked import forked
 from ico3d.common.espeak.isolated import Isolated, LostError, RefusedError, Told, serve
 from ico3d.errors import ServiceError
 
@@ -82,6 +83,15 @@ def _kokoro() -> Any:
     return tokenizer.Tokenizer()
 
 
+def _prepared(request: dict[str, Any]) -> Told:
+    """Answers a request in a copy of this process that has imported what it needs."""
+    if request["voice"] == "piper":
+        _piper(Path(request["description"]))
+    else:
+        _kokoro()
+    return _in_a_copy(request)
+
+
 def _answer(request: dict[str, Any]) -> Told:
     if request["voice"] == "piper":
         phonemes = _piper(Path(request["description"])).phonemize(request["text"])
@@ -90,5 +100,8 @@ def _answer(request: dict[str, Any]) -> Told:
     return {"phonemes": phonemes}, b""
 
 
+_in_a_copy = forked(_answer, int(LONGEST))
+
+
 if __name__ == "__main__":
-    serve(_answer)
+    serve(_prepared)
