@@ -49,7 +49,7 @@ def _tell(answer: Answer, request: dict[str, Any], seconds: int, there: Connecti
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     try:
-        told = ("", answer(request))
+        told: tuple[str, Told] = ("", answer(request))
     except Exception as error:
         told = (str(error), ({}, b""))
     there.send(told)
