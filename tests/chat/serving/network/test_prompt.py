@@ -26,7 +26,7 @@ async def port(body):
 
 @pytest.fixture
 async def unread(tmp_path):
-    """A server of a file too long to be sent unread, of a body's length, and of no answer.
+    """A server of a file too long to be sent unread, of a body's length, a header, and no answer.
 
     Yields its port and its tasks.
     """
@@ -39,6 +39,11 @@ async def unread(tmp_path):
     @app.post("/length")
     async def length(request: Request):
         return len(await request.body())
+
+    @app.post("/name")
+    async def name(request: Request):
+        await request.body()
+        return request.headers.getlist("x-forwarded-for")
 
     @app.get("/nothing")
     async def nothing(request: Request):
@@ -151,6 +156,16 @@ async def test_a_request_has_so_many_headers_and_no_more(port, more, answered):
         writer.write(REQUEST % port + b"a: b\r\n" * (prompt.MOST_HEADERS - 1 + more) + b"\r\n")
         with contextlib.suppress(ConnectionResetError):
             assert (await reader.readline() == b"HTTP/1.1 200 OK\r\n") is answered
+
+
+async def test_a_header_behind_a_body_claims_nothing(unread):
+    port, _ = unread
+    async with connected(port) as (reader, writer):
+        own, other = (b"X-Forwarded-For: 192.0.2.%d\r\n" % n for n in (1, 2))
+        head = b"POST /name" + HOST + own + b"Transfer-Encoding: chunked\r\n\r\n"
+        writer.write(head + b"1\r\nx\r\n0\r\n" + other + b"\r\n")
+        answer = await reader.readuntil(b"]")
+        assert answer.endswith(b'["192.0.2.1"]')
 
 
 @pytest.mark.parametrize("trailer", [b"x" * 5000, b"a: b\r\n" * 50])

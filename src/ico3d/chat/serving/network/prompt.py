@@ -73,20 +73,26 @@ class PromptProtocol(HttpToolsProtocol):
         if self.pipeline:
             self._cut_off("one request at a time, and one more.")
         super().on_message_begin()
+        self._num_headers, self._within_head = 0, True
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """A header has arrived; cookies are left out, for WebSockets, too.
 
+        So are headers behind a body: a proxy that is asked to vouch for an address or a key looks
+        at the head alone, and passes on the others as they are.
+
         Raises:
             ProtocolError: If it is one too many; the connection is closed.
         """
-        if len(self.headers) >= MOST_HEADERS:
+        self._num_headers += 1
+        if self._num_headers > MOST_HEADERS:
             self._cut_off(f"more than {MOST_HEADERS} headers.")
-        if name.lower() != UNREAD:
+        if self._within_head and name.lower() != UNREAD:
             super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
         """The head of a request has arrived."""
+        self._within_head = False
         self._stop_waiting()
         self._head_bytes = 0
         before = self.cycle
