@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import loose_json
+from ico3d.common.unpacking.memory import free_memory
 from ico3d.errors import ModelError
 from ico3d.training.finite import all_finite
 
@@ -52,6 +53,8 @@ _UNSEALED = b'{"__metadata__":{"state"'
 """How that of a file without a hash begins."""
 _NO_SEAL = b"0" * 64
 _CHUNK = 1 << 20
+_COPIES = 4
+"""So often may a file's tensors lie in memory at once, while a model is made of them and shown."""
 
 
 def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None:
@@ -123,11 +126,21 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
     """Reads the tensors, onto the CPU, and the state that `save_tensors` wrote.
 
     Raises:
-        ModelError: If the file is missing, damaged, or no checkpoint.
+        ModelError: If the file is missing, damaged, no checkpoint, or too large for this machine.
     """
     with _opened(path) as file:
+        _check_room(path)
         state = loose_json((file.metadata() or {})["state"])
         return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
+
+
+def _check_room(path: Path) -> None:
+    """Refuses a file that takes all of the memory; a disk may hold it in a few bytes, as a hole."""
+    size, most = path.stat().st_size, free_memory() // _COPIES
+    if size > most:
+        raise ModelError(
+            f"{path} has {size / 2**30:.1f} GiB; the free memory is enough for {most / 2**30:.1f}."
+        )
 
 
 def load_sealed(path: Path) -> tuple[dict[str, Tensor], dict]:

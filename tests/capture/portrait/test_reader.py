@@ -134,6 +134,13 @@ def test_missing_frame(folder):
     _fails(folder, "frame 5", "ori_imgs/5.jpg", "missing")
 
 
+def test_landmarks_that_claim_gigabytes_are_not_read(folder):
+    with (folder / "ori_imgs" / "5.lms").open("r+b") as hole:
+        hole.truncate(1 << 32)
+    with pytest.raises(CaptureError, match=r"5\.lms.*no small file"):
+        open_capture(folder).landmarks(0, 5)
+
+
 def test_ids_off_by_one(folder):
     portrait_folder.write_transforms(folder, list(range(1, 23)), portrait_folder.head_poses())
     _fails(folder, "frame 22", "missing")

@@ -8,10 +8,13 @@ import numpy as np
 from PIL import Image
 
 from ico3d.capture.decoding import open_picture
+from ico3d.common.files import read_small
 from ico3d.errors import CaptureError
 
 DETAILS = "ico3d.json"
 """File for data that have no place in the talking-portrait layout."""
+MOST_LANDMARKS = 1 << 16
+"""Bytes of a file of landmarks; they have about two thousand."""
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -31,8 +34,14 @@ def save_landmarks(path: Path, landmarks: np.ndarray) -> None:
 
 
 def load_landmarks(path: Path) -> np.ndarray:
-    """Reads landmarks (68, 2) in pixels."""
-    return np.loadtxt(path, dtype=np.float64).reshape(-1, 2)
+    """Reads landmarks (68, 2) in pixels.
+
+    Raises:
+        OSError: If the file is not there, or no small one.
+        ValueError: If it holds something else than numbers.
+    """
+    lines = read_small(path, most=MOST_LANDMARKS).decode().splitlines()
+    return np.loadtxt(lines, dtype=np.float64).reshape(-1, 2)
 
 
 def camera_to_world(camera_from_head: np.ndarray) -> np.ndarray:

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from ico3d.avatar.embodying.look import UNCHANGED, Look
-from ico3d.capture.reading.memory import free_memory
 from ico3d.capture.vetting.limits import limit_memory
 from ico3d.common.files import json_of, write_atomic
+from ico3d.common.unpacking.memory import free_memory
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError, printable
