@@ -117,6 +117,23 @@ def test_pictures_larger_than_any_are_refused(tmp_path: Path) -> None:
     refused(SmcFile(tmp_path / "a.smc").encoded, "large")
 
 
+def test_attributes_are_a_few_numbers_or_one_word(tmp_path: Path) -> None:
+    words = h5py.string_dtype()
+    with h5py.File(tmp_path / "a.smc", "w") as file:
+        file.attrs.update(number=3, numbers=np.zeros(512), word="female", fixed=np.bytes_("f" * 9))
+        file.attrs.update(many=np.zeros(513), long=np.bytes_("f" * 5000))
+        file.attrs.create("words", ["a", "a"], dtype=words)
+        rows = np.empty(2, object)
+        rows[:] = np.zeros(2, np.uint8), np.zeros(3, np.uint8)
+        file.attrs.create("rows", rows, dtype=h5py.vlen_dtype(np.uint8))
+    opened = SmcFile(tmp_path / "a.smc")
+    assert opened.attribute("", "number") == 3 and opened.attribute("", "word") == "female"
+    assert len(opened.attribute("", "numbers")) == 512
+    assert opened.attribute("", "fixed") == b"f" * 9 and opened.attribute("", "none") is None
+    for name in ("many", "long", "words", "rows"):
+        refused(lambda inside, name=name: opened.attribute(inside, name), "")
+
+
 def test_a_picture_linked_a_thousand_times_is_checked_at_once(tmp_path: Path) -> None:
     rig = dna_files.Rig(cameras=(0, 1, 2, 48), annotated=False)
     main, frames, size = dna_files.write_recording(tmp_path, rig), 400, 200 * MIB

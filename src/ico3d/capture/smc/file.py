@@ -24,8 +24,8 @@ LARGEST_PICTURE = 64 * 2**20
 """The same of an encoded picture; 4096 × 3000 pixels take 37 MB where nothing packs them."""
 MOST_ROWS = 100_000
 """Largest number of frames, and of rows of a table where any number is allowed."""
-MOST_VALUES = 16
-"""Largest number of values in an attribute."""
+LARGEST_ATTRIBUTE = 4096
+"""Largest size of an attribute in bytes; they are numbers and words."""
 MOST_LINKS, LONGEST_LINK = 32, 4096
 """Links by name on one path, and letters of what one names; links in a circle have no end."""
 _NUMBER = re.compile("[0-9]{1,9}")
@@ -89,7 +89,11 @@ class SmcFile:
             node = self._find(inside)
             if node is None or name not in node.attrs:
                 return None
-            if np.prod(node.attrs.get_id(name).shape, dtype=float) > MOST_VALUES:
+            about = node.attrs.get_id(name)
+            count = np.prod(about.shape, dtype=float)
+            # What changes in length lies elsewhere, and many values may lie in one place.
+            elsewhere = about.dtype.hasobject and count > 1
+            if elsewhere or count * about.dtype.itemsize > LARGEST_ATTRIBUTE:
                 raise self._damaged(f"the attribute {name} of {inside or 'the file'}")
             return node.attrs[name]
 
