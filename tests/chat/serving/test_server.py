@@ -86,6 +86,10 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
             assert (await client.get(f"/bundle/{name}")).status_code == 404
         assert "script-src 'self'" in head.headers["content-security-policy"]
         assert (await client.get("/health", headers={"Host": "evil.example"})).status_code == 403
+        own = str(client.base_url).partition("://")[2].strip("/")
+        two = [("Host", own), ("Host", "evil.example")]
+        assert (await client.get("/health", headers=two[:1])).status_code == 200
+        assert (await client.get("/health", headers=two)).status_code == 403
         foreign = await client.get("/health", headers={"Origin": "http://evil.example"})
         assert foreign.status_code == 403
 

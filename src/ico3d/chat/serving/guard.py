@@ -87,7 +87,8 @@ class Guard:
         headers = Headers(scope=scope)
         origin, path = headers.get("origin"), scope["path"]
         site = origin if self._sites.permits(origin, path) else None
-        host = headers.get("host")
+        hosts = headers.getlist("host")
+        host = hosts[0] if len(hosts) == 1 else None  # of two, others might look at the second
         if not is_own(host, None if site else origin, self._host, self._names):
             if self._refusals and origin and is_own(host, None, self._host, self._names):
                 self._refusals.tell(origin, path)

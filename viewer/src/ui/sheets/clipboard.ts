@@ -29,3 +29,8 @@ export function saveText(text: string, name: string): void {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href)); // browsers have begun to read it
 }
+
+/** A text without control characters, which terminals obey, but with its line ends. */
+export function plain(text: string): string {
+  return text.replace(/(?!\n)\p{Cc}/gu, '');
+}

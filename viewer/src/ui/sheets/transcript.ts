@@ -2,7 +2,7 @@ import type { Progress } from '../../talk/captioning.ts';
 import { TalkRecord, type Entry } from '../../talk/record.ts';
 import type { PageWords } from '../../words/page-words.ts';
 import { say, type Sentence } from '../../words/text.ts';
-import { copyText, saveText } from './clipboard.ts';
+import { copyText, plain, saveText } from './clipboard.ts';
 import { Disclosure } from './disclosure.ts';
 import { keepUp, type TalkStore } from './kept-talk.ts';
 import { byId } from '../elements.ts';
@@ -214,7 +214,7 @@ export class Transcript {
     const written = (lines: readonly Entry[]) => lines.map((entry) => `[${this.clock(entry.at)}] ${this.line(entry)}`);
     const before = earlier.length > 0 ? [this.aboutEarlier(), ...written(earlier), '', this.aboutNow()] : [];
     const day = this.began.toLocaleDateString(this.words.language, { dateStyle: 'long' });
-    return [`${this.talker.name}, ${day}`, '', ...before, ...written(entries), ''].join('\n');
+    return plain([`${this.talker.name}, ${day}`, '', ...before, ...written(entries), ''].join('\n'));
   }
 
   private fileName(): string {
