@@ -74,10 +74,11 @@ HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
 BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=8)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
-    "--steps 8000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5000"
+    "--steps 7000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 4500 "
+    "--density.gradient 0.00018 --density.min-contribution 0.15"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 150 --initial.gaussians 30000 --density.max-gaussians 55000 "
+    "--steps-per-frame 100 --initial.gaussians 36000 --density.max-gaussians 62000 "
     "--density.until 0.6 --joining.no-match-colors"
 )
 
