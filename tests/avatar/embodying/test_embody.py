@@ -50,7 +50,7 @@ def alone(tmp_path_factory):
     manifest = replace(
         demo.manifest,
         name="Ada",
-        head=replace(info, fps=25.0, num_poses=1),
+        head=replace(info, fps=25.0, num_poses=1, num_rest=0),
         skinned=None,
         provenance=ADA,
     )
