@@ -94,14 +94,14 @@ def test_views_that_do_not_agree_are_refused(face_model, packaged_demo, tmp_path
 def test_a_head_without_landmarks_is_joined(
     face_model, looked_at_once, packaged_demo, tmp_path, monkeypatch
 ):
-    """In another studio, whose axes are others: within 5 mm; the avatar's head knows its face.
+    """In another studio, whose axes are others: within 6 mm; the avatar's head knows its face.
 
     The recording's own landmarks are of another kind, and nowhere near.
     """
     capture, said = FilmedDemo(tmp_path / "capture"), []
     monkeypatch.setattr(capture, "landmarks_3d", lambda frame: np.zeros((68, 3)))
     place_head(capture, tmp_path / "out", saved(head_abroad(), tmp_path / "head"), said.append)
-    assert away(capture, tmp_path / "out") < 0.005
+    assert away(capture, tmp_path / "out") < 0.006
     assert TrainedHead.load(tmp_path / "out" / HEAD).landmarks is not None
     line = next(line for line in said if line.startswith("face: "))
     assert "found in 15 of 15 views drawn of it, which agree within" in line
