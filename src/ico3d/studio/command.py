@@ -45,8 +45,8 @@ class Synthetic:
     """Also show moods and glances. Without this the face only speaks, blinks and raises brows,
     which is all that a head driven by speech can know."""
     light: Literal["studio", "soft", "warm"] = "studio"
-    """Neutral lamps (`studio`), or warm lamps from the other side (`warm`); the light becomes
-    part of the recorded colours."""
+    """Neutral lamps (`studio`), the same through wide cloths (`soft`), or warm lamps from the
+    other side (`warm`); the light becomes part of the recorded colours."""
     motion: Literal["showcase", "talk", "walk", "sway", "repertoire"] = "talk"
     """What a whole person does: `talk` stands and gestures in turn; `walk` walks in place;
     `repertoire` takes hands, head and chest through what they do in conversations, and walks;

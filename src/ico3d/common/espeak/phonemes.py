@@ -7,7 +7,7 @@ copy of itself; the voice itself, which takes nearly all of the time, stays with
 
 import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -83,21 +83,22 @@ def _kokoro() -> Any:
     return tokenizer.Tokenizer()
 
 
+def _phonemizer(request: dict[str, Any]) -> Callable[[str], Any]:
+    """What makes phonemes of a text in the voice and language of a request, imported once."""
+    if request["voice"] == "piper":
+        return _piper(Path(request["description"])).phonemize
+    tokenizer = _kokoro()
+    return lambda text: tokenizer.phonemize(text, request["language"])
+
+
 def _prepared(request: dict[str, Any]) -> Told:
     """Answers a request in a copy of this process that has imported what it needs."""
-    if request["voice"] == "piper":
-        _piper(Path(request["description"]))
-    else:
-        _kokoro()
+    _phonemizer(request)
     return _in_a_copy(request)
 
 
 def _answer(request: dict[str, Any]) -> Told:
-    if request["voice"] == "piper":
-        phonemes = _piper(Path(request["description"])).phonemize(request["text"])
-    else:
-        phonemes = _kokoro().phonemize(request["text"], request["language"])
-    return {"phonemes": phonemes}, b""
+    return {"phonemes": _phonemizer(request)(request["text"])}, b""
 
 
 _in_a_copy = forked(_answer, int(LONGEST))

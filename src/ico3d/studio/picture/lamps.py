@@ -1,6 +1,6 @@
 """How the studios are lit: lamps of some size, and the light that walls and floor send back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,24 +79,24 @@ def harmonic_basis(directions: np.ndarray) -> np.ndarray:
     )
 
 
+_STUDIO = Lamps(
+    np.array([[-0.74, 0.62, 0.74], [0.85, 0.12, 0.60], [0.66, 0.58, -0.98]]),
+    np.array([[1.64, 1.55, 1.43], [0.33, 0.34, 0.36], [1.40, 1.42, 1.46]]),
+    np.array([0.30, 0.45, 0.20]),
+    np.array([0.27, 0.285, 0.305]),
+    np.array([0.21, 0.22, 0.235]),
+    np.array([0.145, 0.13, 0.12]),
+    np.array([0.92, 0.97, 1.06]),
+)
 STUDIOS = {
-    "studio": Lamps(
-        np.array([[-0.74, 0.62, 0.74], [0.85, 0.12, 0.60], [0.66, 0.58, -0.98]]),
-        np.array([[1.64, 1.55, 1.43], [0.33, 0.34, 0.36], [1.40, 1.42, 1.46]]),
-        np.array([0.30, 0.45, 0.20]),
-        np.array([0.27, 0.285, 0.305]),
-        np.array([0.21, 0.22, 0.235]),
-        np.array([0.145, 0.13, 0.12]),
-        np.array([0.92, 0.97, 1.06]),
-    ),
-    "soft": Lamps(
-        np.array([[-0.74, 0.62, 0.74], [0.85, 0.12, 0.60], [0.66, 0.58, -0.98]]),
-        np.array([[1.25, 1.19, 1.11], [0.50, 0.51, 0.53], [1.10, 1.12, 1.15]]),
-        np.array([0.75, 0.80, 0.50]),
-        np.array([0.34, 0.355, 0.38]),
-        np.array([0.285, 0.295, 0.315]),
-        np.array([0.205, 0.18, 0.17]),
-        np.array([0.92, 0.97, 1.06]),
+    "studio": _STUDIO,
+    "soft": replace(
+        _STUDIO,
+        colors=np.array([[1.25, 1.19, 1.11], [0.50, 0.51, 0.53], [1.10, 1.12, 1.15]]),
+        sizes=np.array([0.75, 0.80, 0.50]),
+        sky=np.array([0.34, 0.355, 0.38]),
+        wall=np.array([0.285, 0.295, 0.315]),
+        ground=np.array([0.205, 0.18, 0.17]),
     ),
     "warm": Lamps(
         np.array([[0.82, 0.58, 0.60], [-0.80, 0.20, 0.55], [-0.60, 0.62, -0.80]]),
