@@ -113,7 +113,9 @@ def test_names_that_no_file_can_have(body, tmp_path, named):
         {"windows": [{"first": 4, "last": 2, "file": "0.safetensors"}]},
         {"method": "levitation"},
         {"method": []},
+        {"windows": [{"first": 0, "last": 10**9, "file": "0.safetensors"}]},
         {"summary": []},
+        {"summary": {"continued": [{"cameras": ["c"], "frames": [[0]]}]}},
     ],
     ids=lambda changes: f"{changes}"[:30],
 )

@@ -164,6 +164,16 @@ def test_a_head_of_an_earlier_version_opens(tiny, tmp_path):
         train_head(tiny, tmp_path, _job(steps=3))
 
 
+def test_what_no_head_tells_of_itself_is_refused(tiny, tmp_path):
+    train_head(tiny, tmp_path, _job(steps=2))
+    about = json.loads((tmp_path / "head.json").read_text())
+    false = ({"summary": []}, {"inputs": 5}, {"inputs": []}, {"blendshape_names": [1]})
+    for changes in (*false, {"encoder": []}, {"summary": {"recoloured": 7}}):
+        (tmp_path / "head.json").write_text(json.dumps({**about, **changes}))
+        with pytest.raises(ModelError, match="holds no trained head"):
+            TrainedHead.load(tmp_path)
+
+
 def test_eyes_that_make_no_sense_are_refused(tiny, tmp_path):
     train_head(tiny, tmp_path, _job("speech", steps=2))
     about = json.loads((tmp_path / "head.json").read_text())

@@ -15,6 +15,7 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.opening import motion_from
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import Method
+from ico3d.capture.parts.trained_on import check_told
 from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.gaussians import Gaussians
@@ -26,6 +27,8 @@ UNTUNED = "untuned.json"
 """Name of the file that lists the windows before temporal fine-tuning, if there was one."""
 CAMERA_COLORS = "camera_colors"
 """Name of the tensor of a window's file that says how the cameras' colours differ."""
+MOST_FRAMES = 100_000
+"""Longest clip that is believed, an hour at 25 frames per second: some verbs draw every frame."""
 ROUNDING = 1e-6
 """Tolerance in frames for times that stand for whole frames: (31 / 15 s) · 15 may exceed 31."""
 
@@ -178,5 +181,8 @@ def _check_told(windows: Sequence[Window], fps: float, method: object, summary: 
     ordered = all(a < b for a, b in pairwise(ends)) and all(len(window) > 0 for window in windows)
     if windows[0].first < 0 or not ordered:
         raise ValueError("its windows do not follow one another")
-    if method not in get_args(Method) or not isinstance(summary, dict):
-        raise ValueError("it has no method or summary")
+    if windows[-1].last >= MOST_FRAMES:
+        raise ValueError(f"its clip has more than {MOST_FRAMES} frames")
+    if method not in get_args(Method):
+        raise ValueError("it has no method")
+    check_told(summary)

@@ -3,12 +3,13 @@
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import torch
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.parts.trained_on import check_told
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE, TURN_SIZE, EyeRange
 from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
@@ -158,6 +159,8 @@ class TrainedHead:
             encoder = about["encoder"], about["encoder_sha256"]
             summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))
             eyes, turn = _eyes(about.get("eyes")), _turn(about.get("turn"))
+            _check_driven(inputs, names, *encoder)
+            check_told(summary)
         except DAMAGED as error:
             raise ModelError(
                 f"{folder} holds no trained head ({error}): train one with ico3d train head."
@@ -165,6 +168,15 @@ class TrainedHead:
         adaptor = _load_adaptor(folder / "adaptor.safetensors") if inputs == "speech" else None
         model = HeadModel.load(folder / "model.safetensors")
         return cls(model, inputs, names, *encoder, adaptor, summary, landmarks, eyes, turn)
+
+
+def _check_driven(inputs: object, *words: object) -> None:
+    """Raises ValueError if a folder does not say in words what drives its head."""
+    if inputs not in get_args(Inputs):
+        raise ValueError(f"nothing called {inputs!r:.40} drives heads")
+    names, *encoder = words
+    if not all(isinstance(word, str) for word in (*names, *encoder)):
+        raise ValueError("it names blendshapes or its encoder by something else than words")
 
 
 def _landmarks(values: list | None) -> np.ndarray | None:

@@ -7,7 +7,12 @@ import pytest
 
 from ico3d.capture.capture import Capture, last_eleventh
 from ico3d.capture.parts.held_out import scored_pictures, training_part
-from ico3d.capture.parts.trained_on import check_untrained, is_same_recording, trained_on
+from ico3d.capture.parts.trained_on import (
+    check_told,
+    check_untrained,
+    is_same_recording,
+    trained_on,
+)
 from ico3d.errors import CaptureError
 from support.avatars.planted_person import FRAMES, PlantedPerson
 from support.heads.tiny_capture import TinyCapture
@@ -86,9 +91,41 @@ def test_what_trained_is_no_test(person, tmp_path):
     copied = PlantedPerson(tmp_path / "copied")
     with pytest.raises(CaptureError, match="trained this model"):
         check_untrained([record], copied, [2], [4])
+    endless = record | {"frames": [[0, 10**15]]}  # of a stranger's model: nothing is counted out
+    with pytest.raises(CaptureError, match=r"frame 3 by camera c2"):
+        check_untrained([endless], person, [2], [4, 3])
     other = PlantedPerson.elsewhere(tmp_path / "other")
     assert is_same_recording(record, copied) and not is_same_recording(record, other)
     check_untrained([record], other, [2], [4])
+
+
+RECORD = {"cameras": ["c0"], "frames": [[0, 2]]}
+
+
+@pytest.mark.parametrize(
+    "summary",
+    [
+        [],
+        "text",
+        {"recording": []},
+        {"recoloured": 7},
+        {"continued": {}},
+        {"continued": ["text"]},
+        {"recording": RECORD | {"frames": "ab"}},
+        {"recording": RECORD | {"frames": [[0.5, 1]]}},
+        {"recording": RECORD | {"frames": [[1]]}},
+        {"recording": RECORD | {"frames": [[True, 1]]}},
+        {"recording": RECORD | {"cameras": 5}},
+        {"recording": RECORD | {"cameras": [[1]]}},
+        {"recording": {"cameras": ["c0"]}},
+    ],
+    ids=str,
+)
+def test_records_that_make_no_sense(summary):
+    check_told({"recording": RECORD, "recoloured": {}, "continued": [RECORD]})
+    check_told({})
+    with pytest.raises(ValueError, match=r"summary|record|continued"):
+        check_told(summary)
 
 
 def test_heads_are_split_by_frames():

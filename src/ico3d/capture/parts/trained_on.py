@@ -1,6 +1,7 @@
 """Which pictures of which recording trained a model, so that nobody takes them for tests."""
 
 import hashlib
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -42,6 +43,28 @@ def fingerprint(capture: Capture) -> str:
     return digest.hexdigest()
 
 
+def check_told(summary: object) -> None:
+    """Checks what a model's folder tells of its trainings, which a stranger may have written.
+
+    Args:
+        summary: The folder's summary; `recording`, `recoloured` and each of `continued`, where they
+            are there, are records of `trained_on`.
+
+    Raises:
+        ValueError: If the summary is none, or a record is impossible.
+    """
+    if not isinstance(summary, dict):
+        raise ValueError("it has no summary")
+    continued = summary.get("continued", [])
+    if not isinstance(continued, list):
+        raise ValueError("what it continued is no list")
+    for record in (summary.get("recording", {}), summary.get("recoloured", {}), *continued):
+        if not isinstance(record, dict):
+            raise ValueError("a record of its training is no object")
+        if "cameras" in record and not (_are_names(record["cameras"]) and _are_runs(record)):
+            raise ValueError("a record of its training has no names of cameras, or no frames")
+
+
 def is_same_recording(record: dict, capture: Capture) -> bool:
     """Whether a record of `trained_on` tells of this recording."""
     if record.get("path") == str(capture.path.resolve()):
@@ -71,11 +94,10 @@ def check_untrained(
         if "cameras" not in record or not is_same_recording(record, capture):
             continue
         seen = sorted(asked & set(record["cameras"]))
-        taught = {f for first, last in record["frames"] for f in range(first, last + 1)}
-        both = sorted(taught & set(frames))
-        if seen and both:
+        taught = _first_within(record["frames"], frames)
+        if seen and taught is not None:
             raise CaptureError(
-                f"{capture.path}: frame {both[0]} by camera {seen[0]} trained this model and "
+                f"{capture.path}: frame {taught} by camera {seen[0]} trained this model and "
                 "cannot test it: train without it (--hold-out leaves out validation pictures), or "
                 "score all pictures, trained or not, by --frames all."
             )
@@ -99,3 +121,26 @@ def _runs(frames: Iterable[int]) -> list[list[int]]:
         else:
             runs.append([frame, frame])
     return runs
+
+
+def _first_within(runs: Iterable[Sequence[int]], frames: Iterable[int]) -> int | None:
+    """The first of some frames that lies in a run; however long runs are, none is counted out."""
+    ordered = sorted(frames)
+    found = []
+    for first, last in runs:
+        place = bisect_left(ordered, first)
+        if place < len(ordered) and ordered[place] <= last:
+            found.append(ordered[place])
+    return min(found, default=None)
+
+
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+def _are_runs(record: dict) -> bool:
+    """Whether a record's frames are pairs of whole numbers."""
+    runs = record.get("frames")
+    return isinstance(runs, list) and all(
+        isinstance(run, list) and [type(end) for end in run] == [int, int] for run in runs
+    )
