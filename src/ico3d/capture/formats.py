@@ -94,6 +94,13 @@ SMC files of unknown names are read as DNA-Rendering.
 """
 
 
+def opened_apart(capture: Capture) -> Capture:
+    """The recording of an open capture with open files of its own, for another thread."""
+    from ico3d.capture.multiview.reader import MultiviewCapture
+
+    return capture.apart() if isinstance(capture, MultiviewCapture) else open_capture(capture.path)
+
+
 def open_capture(path: Path | str) -> Capture:
     """Opens a capture of any format, with the tracked head if there is a track.
 

@@ -2,12 +2,13 @@
 
 import os
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from ico3d.capture.checking.check import examine
-from ico3d.capture.formats import open_capture
+from ico3d.capture.formats import open_capture, opened_apart
 from ico3d.capture.multiview.clip import MOST_OPEN, Clip
 from ico3d.errors import CaptureError
 from support.recordings import multiview_folders
@@ -49,6 +50,20 @@ def test_few_videos_are_open_at_a_time(tmp_path):
         for camera in range(6):
             assert multiview_folders.number_of(capture.image(camera, frame)) == frame
     assert len(os.listdir("/proc/self/fd")) - before <= MOST_OPEN
+
+
+def test_threads_decode_for_themselves(tmp_path):
+    """Each in its own order, at the same time."""
+    capture = open_capture(recording(tmp_path, cameras=2))
+    assert multiview_folders.number_of(capture.image(0, 4)) == 4
+    orders = ([5, 6, 2, 7], [19, 0, 11, 12], [4, 3, 2, 1])
+
+    def numbers(order):
+        own = opened_apart(capture)
+        return [multiview_folders.number_of(own.image(0, frame)) for frame in order]
+
+    with ThreadPoolExecutor(3) as pool:
+        assert tuple(pool.map(numbers, orders)) == orders
 
 
 def test_forked_processes_and_pickled_copies_read_for_themselves(tmp_path):

@@ -1,13 +1,17 @@
 """Masks from clean plates, against the truth of a drawn scene."""
 
 import logging
+from functools import partial
 
 import cv2
 import numpy as np
 import pytest
 
-from ico3d.capture.formats import open_capture
+from ico3d.capture.formats import open_capture, opened_apart
+from ico3d.capture.multiview import reader
 from ico3d.capture.multiview.cutout import matte
+from ico3d.capture.multiview.description import read_description
+from ico3d.capture.multiview.masks import make_masks
 from ico3d.cli import main
 from ico3d.errors import CaptureError
 from support.recordings import multiview_folders
@@ -132,6 +136,33 @@ def test_a_damaged_picture_ends_it_with_its_name(tmp_path, capsys):
     (folder / "images/cam01/000002.png").write_bytes(b"\x89PNG")
     assert main(["capture", "masks", str(folder), "--workers", "1"]) == 1
     assert "camera cam01, frame 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("link", ["masks", "masks/cam01"])
+def test_nothing_is_written_where_a_link_leads(tmp_path, capsys, link):
+    """The names of cameras, and so of folders, are those of whoever sent the recording."""
+    folder, elsewhere = recording(tmp_path / "recording"), tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (folder / link).parent.mkdir(exist_ok=True)
+    (folder / link).symlink_to(elsewhere)
+    assert main(["capture", "masks", str(folder)]) == 1
+    assert "leads out of the recording" in capsys.readouterr().err
+    assert not any(elsewhere.iterdir())
+
+
+def test_a_recording_is_opened_once_for_all_cameras(tmp_path, monkeypatch):
+    """Opening takes time for each camera: once for each would be the square of that."""
+    folder, opened = recording(tmp_path, cameras=4, frames=1), []
+    monkeypatch.setattr(reader, "read_description", partial(counted, opened))
+    assert make_masks(folder, 2) == 4
+    parts = [opened_apart(capture) for capture in [open_capture(folder)] * 3]
+    assert len(opened) == 2
+    assert len({id(part.files) for part in parts}) == 3
+
+
+def counted(opened, path):
+    opened.append(path)
+    return read_description(path)
 
 
 def test_plates_of_another_size_are_refused():

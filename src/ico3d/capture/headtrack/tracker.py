@@ -9,7 +9,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.face.expressions import BLENDSHAPES, eyes_of_blendshapes
 from ico3d.capture.face.landmarks import MULTI_PIE
 from ico3d.capture.face.mediapipe_face import canonical_face
-from ico3d.capture.formats import open_capture
+from ico3d.capture.formats import open_capture, opened_apart
 from ico3d.capture.headpose.shape import inverse, moved, rigid_head
 from ico3d.capture.headpose.smoothing import filled, filled_poses, smoothed_poses
 from ico3d.capture.headpose.track_file import HeadTrack
@@ -61,7 +61,8 @@ def track_head(source: Path, workers: int) -> tuple[HeadTrack, Report]:
     """
     model = model_file("face_landmarker.task", PURPOSE)
     canonical = canonical_face(model)
-    with finder(lambda: open_capture(source), canonical, model, workers) as found:
+    whole = open_capture(source)
+    with finder(lambda: opened_apart(whole), canonical, model, workers) as found:
         capture, heads, last = found.capture, {}, None
         with shown("finding the head", capture.num_frames) as advance:
             for frame in range(capture.num_frames):

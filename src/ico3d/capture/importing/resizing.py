@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.decoding import to_bytes
-from ico3d.capture.formats import open_capture
+from ico3d.capture.formats import open_capture, opened_apart
 from ico3d.capture.headpose.track_file import NAME as TRACK
 from ico3d.capture.headpose.track_file import track_file
 from ico3d.capture.importing.resized import ResizedCapture
@@ -36,7 +36,8 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
     Raises:
         CaptureError: If `out` exists, or the capture cannot be read.
     """
-    capture = ResizedCapture(open_capture(source), height)
+    whole = open_capture(source)
+    capture = ResizedCapture(whole, height)
     known = capture.provenance
     about = Description(
         capture.fps,
@@ -52,7 +53,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
     with new_folder(out, about.likeness, about.sources) as work:
 
         def start(camera: int) -> View:
-            opened = ResizedCapture(open_capture(source), height)
+            opened = ResizedCapture(opened_apart(whole), height)
             return lambda frame: _write_view(opened, work, camera, frame)
 
         each_camera(start, cameras, capture.num_frames, workers, "pictures")

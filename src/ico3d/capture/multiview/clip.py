@@ -39,6 +39,12 @@ class Clip:
     def __getstate__(self) -> dict:
         return {"path": self.path, "_index": self._index, "_decoder": None}
 
+    def apart(self) -> "Clip":
+        """The same video, to be opened once more."""
+        other = Clip(self.path)
+        other._index = self._index
+        return other
+
     @property
     def count(self) -> int:
         """Number of pictures in the file.

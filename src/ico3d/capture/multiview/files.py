@@ -1,5 +1,6 @@
 """The files of a multiview folder: pictures as recorded, with lens distortion."""
 
+import copy
 import os
 import re
 from pathlib import Path
@@ -28,6 +29,13 @@ class RecordedFiles:
         self.folder, self._lenses = folder, lenses
         self._clips = [self._find_clip(lens.name) for lens in lenses]
         self._open = OpenClips()
+
+    def apart(self) -> "RecordedFiles":
+        """The same files with open videos of their own, for another thread."""
+        other = copy.copy(self)
+        other._clips = [clip and clip.apart() for clip in self._clips]
+        other._open = OpenClips()
+        return other
 
     def clip(self, camera: int) -> Clip | None:
         """The video of a camera, or None for a camera with single pictures."""

@@ -27,9 +27,14 @@ def make_masks(folder: Path, workers: int) -> int:
         The number of masks written.
 
     Raises:
-        CaptureError: If the folder has no clean plate, or a picture is damaged.
+        CaptureError: If the folder has no clean plate, a picture is damaged, or masks would be
+            written somewhere else, where links lead.
     """
     capture = MultiviewCapture(folder)
+    for lens in capture.lenses:
+        place = folder / "masks" / lens.name
+        if not place.resolve().is_relative_to(folder.resolve()):
+            raise CaptureError(f"{place} leads out of the recording: put a folder there instead.")
     plates = [capture.files.plate(camera) is not None for camera in range(len(capture.cameras))]
     if not any(plates):
         raise CaptureError(
@@ -40,19 +45,19 @@ def make_masks(folder: Path, workers: int) -> int:
         if not there:
             log.warning("%s: camera %s has no clean plate and gets no masks.", folder, lens.name)
     cameras = [camera for camera, there in enumerate(plates) if there]
-    return each_camera(lambda c: _masker(folder, c), cameras, capture.num_frames, workers, "masks")
+    return each_camera(lambda c: _masker(capture, c), cameras, capture.num_frames, workers, "masks")
 
 
-def _masker(folder: Path, camera: int) -> View:
+def _masker(capture: MultiviewCapture, camera: int) -> View:
     """What writes the masks of one camera."""
-    capture = MultiviewCapture(folder)
-    plate = capture.files.plate(camera)
-    masks = folder / "masks" / capture.lenses[camera].name
+    files = capture.files.apart()
+    plate = files.plate(camera)
+    masks = capture.path / "masks" / capture.lenses[camera].name
 
     def write(frame: int) -> int:
-        if capture.files.file("masks", camera, frame) is not None:
+        if files.file("masks", camera, frame) is not None:
             return 0
-        picture = capture.files.picture(camera, frame)
+        picture = files.picture(camera, frame)
         if picture is None or plate is None:
             return 0
         write_atomic(masks / f"{frame:06d}.png", png(matte(picture[..., :3], plate)))

@@ -1,5 +1,6 @@
 """Reads a multiview folder (docs/captures/multiview.md)."""
 
+import copy
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,15 @@ class MultiviewCapture(RecordedCapture):
         )
         self._track = read_track(path, self.num_frames, len(self.cameras))
         self.blendshape_names = None if self._track is None else BLENDSHAPES
+
+    def apart(self) -> "MultiviewCapture":
+        """The same recording with open videos of its own, for another thread.
+
+        Nothing is read again: with many cameras that would take long, once for each of them.
+        """
+        other = copy.copy(self)
+        other.files = self.files.apart()
+        return other
 
     def has_image(self, camera: int, frame: int) -> bool:
         """Whether there is a file of the picture, or a video that is long enough."""
