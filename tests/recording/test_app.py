@@ -308,10 +308,15 @@ def test_the_progress_and_the_face_are_shown(page, room):
     assert page.post("/recordings/Ida/making", json={"quality": "x"}).json()["code"] == "quality"
 
 
-def test_delete_removes_everything_and_late_pieces_bring_nothing_back(page, room, video):
+def test_delete_removes_everything_and_late_pieces_bring_nothing_back(
+    page, room, video, monkeypatch
+):
+    ended: list[Path] = []
+    monkeypatch.setattr(room.looks, "end", ended.append)
     _send(page, "text-1", video)
     assert page.delete("/recordings/Ida").status_code == 204
     assert list(room.people.folder.iterdir()) == []
+    assert ended == [room.people.folder / "Ida"]
     late = page.post("/recordings/Ida/takes/left/a1", params={"offset": 0}, content=video)
     assert late.json()["code"] == "unknown" and list(room.people.folder.iterdir()) == []
 

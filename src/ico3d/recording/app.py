@@ -180,6 +180,7 @@ def _add_people(app: FastAPI, room: Room) -> None:
             await asyncio.to_thread(room.makers.stop, person)
             await asyncio.to_thread(room.talks.stop, person.name)
             await asyncio.to_thread(room.people.delete, person.name)
+            await asyncio.to_thread(room.looks.end, person.folder)
         return Response(status_code=204)
 
 

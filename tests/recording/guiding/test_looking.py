@@ -81,6 +81,23 @@ async def test_no_look_goes_on_beyond_the_end_nor_is_its_part_at_fault(costly, m
     assert not looks._running
 
 
+async def test_what_is_gone_is_looked_at_no_longer(costly, monkeypatch):
+    """Only where it was; and nobody hears that it took too much."""
+    monkeypatch.setattr(looking, "SECONDS", 60.0)
+    looks = Looks()
+    going = asyncio.create_task(looks.report(costly, "left"))
+    while not looks._running:
+        await asyncio.sleep(0.01)
+    await asyncio.to_thread(looks.end, costly.parent / "another")
+    await asyncio.sleep(0.2)
+    assert looks._running
+    costly.unlink()
+    await asyncio.to_thread(looks.end, costly.parent)
+    with pytest.raises(Refused) as refused:
+        await asyncio.wait_for(going, 10)
+    assert refused.value.code == "unknown" and not looks._running
+
+
 async def test_a_process_that_fails_is_no_fault_of_the_part(tmp_path, monkeypatch):
     monkeypatch.setattr(looking, "LOOK", "ico3d.nowhere")
     with pytest.raises(CaptureError, match="has failed"):

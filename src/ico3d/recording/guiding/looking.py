@@ -40,7 +40,7 @@ class Looks:
     def __init__(self):
         """Starts none yet."""
         self._is_closed = False
-        self._running: set[subprocess.Popen[bytes]] = set()
+        self._running: dict[subprocess.Popen[bytes], Path] = {}
 
     async def report(self, file: Path, id: str) -> dict[str, Any]:
         """What is found in a part, as `Eye.report` tells it.
@@ -61,6 +61,12 @@ class Looks:
         for process in list(self._running):
             stop(process)
 
+    def end(self, folder: Path) -> None:
+        """Ends the looks at parts in a folder that is gone: until then their bytes are held."""
+        for process, file in list(self._running.items()):
+            if file.is_relative_to(folder):
+                stop(process)
+
     def _report(self, file: Path, id: str) -> dict[str, Any]:
         try:
             size = file.stat().st_size
@@ -69,7 +75,7 @@ class Looks:
         seconds = SECONDS + SECONDS_PER_MEGABYTE * size / 1e6
         words = [str(file), id, str(seconds), str(MOST_BYTES)]
         process = start(LOOK, words, subprocess.PIPE, errors=None)
-        self._running.add(process)
+        self._running[process] = file
         slow = threading.Timer(SLOWEST * seconds, process.kill)
         slow.start()
         if self._is_closed:
@@ -80,12 +86,12 @@ class Looks:
             status = process.wait()
         finally:
             slow.cancel()
-            self._running.discard(process)
+            del self._running[process]
             stop(process)
         if self._is_closed:
             raise CaptureError(f"{file.name}: the server ended while it was looked at.")
         if status < 0:
-            raise costly()
+            raise costly() if file.exists() else nothing_arrived()
         if status:
             raise CaptureError(f"{file.name}: the process that looks at parts has failed.")
         return _answer(json.loads(told))
