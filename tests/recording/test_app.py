@@ -4,6 +4,7 @@ import asyncio
 import errno
 import threading
 from datetime import date
+from pathlib import Path
 from types import SimpleNamespace
 
 import httpx

@@ -1,7 +1,9 @@
 import contextlib
 import os
+import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -159,3 +161,23 @@ def test_a_process_that_ends_leaves_no_files_behind():
     with pytest.raises(ServiceError):
         synthesize("Two.")
     assert not folder.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_fork_while_a_thread_asks_waits_for_nobody():
+    """A program that the event loop starts is such a fork, and the loop waits for it."""
+    synthesize("One.")
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(synthesize, "a long sentence about the weather " * 60)
+        time.sleep(0.1)  # by now it waits for the sound
+        child = os.fork()
+        if child == 0:
+            os._exit(0)
+        assert not asked.done()
+        until = time.monotonic() + 10
+        while not (ended := os.waitpid(child, os.WNOHANG)[0]) and time.monotonic() < until:
+            time.sleep(0.01)
+        if not ended:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+        assert ended and len(asked.result().samples) > 22050

@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import AsyncGenerator, Callable, Sequence
+from typing import Protocol, runtime_checkable
 
 from pipecat.frames.frames import CancelFrame, EndFrame, ErrorFrame, Frame
 from pipecat.pipeline.pipeline import Pipeline
@@ -12,6 +13,22 @@ from pipecat.workers.runner import WorkerRunner
 
 from ico3d.chat.wire.protocol import MICROPHONE_RATE, SPEECH_RATE
 from ico3d.errors import ServiceError
+
+BATCH = 32
+"""Frames that are handed over at once, of sound one second: pipecat's processors give nobody else a
+turn while frames wait for them."""
+MOST_AHEAD = 20.0
+"""Seconds of sound that may wait within a service before it gets more."""
+
+
+@runtime_checkable
+class KeepsWaiting(Protocol):
+    """A service that takes sound faster than it works on it."""
+
+    @property
+    def waiting(self) -> float:
+        """Seconds of sound that it has taken and not yet worked on."""
+        ...
 
 
 class Collector(FrameProcessor):
@@ -68,8 +85,8 @@ async def run(
     await runner.add_workers(worker)
     task = asyncio.create_task(runner.run())
     task.add_done_callback(lambda _: found.put_nowait(None))
+    feeding = asyncio.create_task(_feed(worker, processor, [*frames, EndFrame()]))
     try:
-        await worker.queue_frames([*frames, EndFrame()])
         while True:
             # one wait at a time: whoever streams this may go on in another task
             frame = await asyncio.wait_for(found.get(), deadline - time.monotonic())
@@ -81,10 +98,22 @@ async def run(
                 raise ServiceError(frame.error)
             yield frame
     finally:
+        feeding.cancel()
         # past the worker, which waits for its EndFrame before it takes anything else
         await pipeline.queue_frame(CancelFrame())
         await worker.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+        await asyncio.gather(task, feeding, return_exceptions=True)
+
+
+async def _feed(
+    worker: PipelineWorker, processor: FrameProcessor, frames: Sequence[Frame]
+) -> None:
+    """Hands frames over no faster than the service takes them, and others get their turns."""
+    for at in range(0, len(frames), BATCH):
+        while isinstance(processor, KeepsWaiting) and processor.waiting > MOST_AHEAD:
+            await asyncio.sleep(0.02)
+        await worker.queue_frames(frames[at : at + BATCH])
+        await asyncio.sleep(0)
 
 
 class Spares:

@@ -20,6 +20,7 @@ from typing import Any
 
 _LENGTH = struct.Struct("<I")
 _ANSWER = struct.Struct("<II")
+_PIECE = 1 << 16  # bytes that are read at once: what a pipe holds
 
 Told = tuple[dict[str, Any], bytes]
 """What is told in words and numbers, and in bytes."""
@@ -67,6 +68,8 @@ class Isolated:
                     (sys.executable, "-P", "-m", self._module, self._folder),
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
+                    # a buffer has a lock, which no forked process could take while a thread asks
+                    bufsize=0,
                 )
             late = threading.Timer(self.longest, self._process.kill)
             late.daemon = True
@@ -133,8 +136,9 @@ def _exchange(process: "subprocess.Popen[bytes]", request: dict[str, Any]) -> To
     to, back = process.stdin, process.stdout
     assert to is not None and back is not None
     data = json.dumps(request).encode()
-    to.write(_LENGTH.pack(len(data)) + data)
-    to.flush()
+    left = memoryview(_LENGTH.pack(len(data)) + data)
+    while left:
+        left = left[to.write(left) :]
     words, length = _ANSWER.unpack(_read(back, _ANSWER.size))
     about = json.loads(_read(back, words))
     return about, _read(back, length)
@@ -148,7 +152,10 @@ def _close(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _read(pipe: Any, count: int) -> bytes:
-    data = pipe.read(count)
-    if len(data) < count:
-        raise EOFError
-    return data
+    data = bytearray()
+    while len(data) < count:
+        more = pipe.read(min(count - len(data), _PIECE))
+        if not more:
+            raise EOFError
+        data += more
+    return bytes(data)

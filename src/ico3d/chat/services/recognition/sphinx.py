@@ -96,6 +96,11 @@ class SphinxRecognition(STTService):
         self._lost = False  # the decoder, in this utterance
         self._task: asyncio.Task | None = None
 
+    @property
+    def waiting(self) -> float:
+        """Seconds of speech that wait for the decoder."""
+        return self._waiting / (2 * MICROPHONE_RATE)
+
     async def start(self, frame: StartFrame):
         """Starts the task that feeds the decoder."""
         await super().start(frame)
