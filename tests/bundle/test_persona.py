@@ -90,6 +90,10 @@ def test_a_missing_or_huge_file_is_one_sentence(tmp_path):
         ({"notes": ("|".join(["ab"] * 1001) + "=> c",) * 10}, "notes must ask at most 10000"),
         ({"notes": ("b" * 4000,) * 126}, "has 504004 letters; at most 500000"),
         ({"voice": {"espeak-ng": "b" * 4001}}, "voice must have at most 4000"),
+        *(
+            ({"voice": {"espeak-ng": name}}, "voice must be names")
+            for name in ("", "..", "../q", "/dev/zero", "en+../q", "!v/f3", "a\\b", "en+f2+f3")
+        ),
         ({"suggestions": ("who?",) * 13}, "suggestions must be at most 12 questions"),
         ({"suggestions": ("b" * 101,)}, "questions of at most 100 letters"),
         ({"suggestions": (" ",)}, "suggestions must not be empty texts"),

@@ -12,6 +12,7 @@ from ico3d.common.typed import Rules, fill, parse_json, parse_toml, plain
 from ico3d.errors import BundleError
 
 LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
+VOICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*(\+[A-Za-z0-9_-]+)?")
 MOST_LETTERS = 4000  # of a text
 MOST_IN_ALL = 500_000  # letters of all texts, more than people write by hand
 MOST_NAMES, LONGEST_NAME = 1000, 100  # of forbidden topics, and letters of a name
@@ -138,6 +139,9 @@ def check_persona(persona: Persona, where: str) -> None:
     for code in persona.languages:
         known = LANGUAGE.fullmatch(code) is not None
         _require(known, where, "languages", f"be codes such as 'en' or 'pt-BR', not {code[:40]!r}")
+    for name in persona.voice.values():  # engines look for files of these names
+        known = VOICE.fullmatch(name) is not None
+        _require(known, where, "voice", f"be names such as 'en+f2', not {name[:40]!r}")
     names = [name.strip() for topic in persona.forbidden for name in topic.split("|")]
     _require(all(names), where, "forbidden", "hold topics such as 'politics | elections'")
     few = len(names) <= MOST_NAMES and max(map(_letters, names), default=0) <= LONGEST_NAME

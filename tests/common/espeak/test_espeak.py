@@ -83,9 +83,17 @@ def test_threads_get_their_own_text_and_repeat_it_exactly():
         np.testing.assert_array_equal(found.samples, expected.samples)
 
 
-def test_an_unknown_voice_is_one_sentence():
-    with pytest.raises(SettingsError, match="no voice 'xx-nowhere'"):
-        synthesize("hello", "xx-nowhere")
+@pytest.mark.parametrize("voice", ["xx-nowhere", "file", "!v/f3", "../file", "en-us+../../file"])
+def test_an_unknown_voice_is_one_sentence(voice, tmp_path, monkeypatch):
+    """Nor is a file of that name read, which the library would obey."""
+    (tmp_path / "file").write_text("language en\nspeed 450\nphonemes de\n")
+    monkeypatch.chdir(tmp_path)
+    process.close()  # which ran elsewhere
+    with pytest.raises(SettingsError, match="no voice"):
+        synthesize("hello", voice)
+    with pytest.raises(SettingsError, match="no voice"):
+        synthesize("hello", str(tmp_path / voice))
+    process.close()
 
 
 def test_a_missing_package_names_its_extra():

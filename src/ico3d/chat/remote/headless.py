@@ -105,9 +105,7 @@ async def run(
         await asyncio.gather(task, feeding, return_exceptions=True)
 
 
-async def _feed(
-    worker: PipelineWorker, processor: FrameProcessor, frames: Sequence[Frame]
-) -> None:
+async def _feed(worker: PipelineWorker, processor: FrameProcessor, frames: Sequence[Frame]) -> None:
     """Hands frames over no faster than the service takes them, and others get their turns."""
     for at in range(0, len(frames), BATCH):
         while isinstance(processor, KeepsWaiting) and processor.waiting > MOST_AHEAD:

@@ -11,6 +11,7 @@ import _ctypes
 import contextlib
 import ctypes
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Generator
@@ -28,6 +29,9 @@ _RATE, _PITCH, _RANGE = 1, 3, 4  # numbers of espeak-ng's parameters
 _PHONEME = 7  # event type; 0 ends a list of events
 
 LONGEST = 60.0  # s that a text may take on a machine that is busy with other things
+
+_VOICE = re.compile(r"[A-Za-z0-9_-]+(\+[A-Za-z0-9_-]+)?")
+"""Names of voices; a path would be that of any file, which the library would parse."""
 
 _unload = _ctypes.FreeLibrary if os.name == "nt" else _ctypes.dlclose
 
@@ -139,7 +143,8 @@ def speak(request: Request) -> Answer:
         return 0
 
     with _library() as (library, rate):
-        if library.espeak_SetVoiceByName(request.voice.encode()) != 0:
+        known = _VOICE.fullmatch(request.voice) is not None
+        if not known or library.espeak_SetVoiceByName(request.voice.encode()) != 0:
             raise RefusedError(
                 f"espeak-ng has no voice '{request.voice}': try 'en-us' or 'en-us+f3'."
             )

@@ -52,6 +52,18 @@ def test_espeak_has_those_languages(languages):
         synthesize("a", language)  # raises if there is none
 
 
+@pytest.mark.parametrize("voice", ["sub/x", "../x", "..", ""])
+def test_a_piper_voice_is_no_path(voice, tmp_path, monkeypatch):
+    for place in (tmp_path / "models" / "sub", tmp_path):
+        place.mkdir(parents=True, exist_ok=True)
+        for name in ("x.onnx", "x.onnx.json"):
+            (place / name).touch()
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path / "models"))
+    for named in (voice, str(tmp_path / "x")):
+        with pytest.raises(MissingModelError):
+            piper.find_voice(piper.Settings(voice=named))
+
+
 @pytest.mark.parametrize(
     ("languages", "own", "voice"),
     [

@@ -48,6 +48,8 @@ def find_voice(settings: Settings) -> Path:
     Raises:
         MissingModelError: If the voice is not installed.
     """
+    if Path(settings.voice).name != settings.voice:
+        raise MissingModelError(f"the Piper voice '{settings.voice}' is no name of a voice.")
     names = f"{settings.voice}.onnx", f"{settings.voice}.onnx.json"
     places = [place for folder in model_folders() for place in (folder, folder / settings.voice)]
     for place in places:
