@@ -1,16 +1,22 @@
 """Sound that another machine sends is judged by what it claims before it is made larger."""
 
+import asyncio
 import io
 import struct
+import time
 import tracemalloc
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pipecat.frames.frames import InputAudioRawFrame
 from pipecat.processors.frame_processor import FrameProcessor
 
+from ico3d.chat.remote.headless import MOST_AHEAD, run
 from ico3d.chat.remote.limits import Limits
-from ico3d.chat.remote.recognition import read_wav
+from ico3d.chat.remote.recognition import heard, read_wav
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK
 from ico3d.errors import ProtocolError
 from support.chat.remote import service_app, serving
 from support.chat.serving import visiting
@@ -137,3 +143,44 @@ def form(data):
     field = b'Content-Disposition: form-data; name="x"\r\n\r\n' + 10_000 * b"a"
     file = b'Content-Disposition: form-data; name="file"; filename="a.wav"\r\n\r\n' + data
     return b"--xx\r\n" + field + b"\r\n--xx\r\n" + file + b"\r\n--xx--\r\n"
+
+
+async def test_ten_minutes_keep_nobody_waiting():
+    """Others get their turns all along; handed over at once, it would be a third of the time."""
+    gaps: list[float] = []
+    now = time.monotonic  # what it really takes
+
+    async def wait_for_turns():
+        while True:
+            before = now()
+            await asyncio.sleep(0)
+            gaps.append(now() - before)
+
+    waiting = asyncio.create_task(wait_for_turns())
+    begun = now()
+    found = [frame async for frame in run(Deaf(), heard(np.zeros(RATE * LONGEST, np.int16)), 300)]
+    waiting.cancel()
+    assert len(found) > RATE * LONGEST / MICROPHONE_CHUNK
+    assert max(gaps) < 0.15 * (now() - begun)
+
+
+class Slow(Deaf):
+    """A recogniser that takes sound at once and works on it later."""
+
+    waiting, most = 0.0, 0.0
+
+    async def process_frame(self, frame, direction):
+        await super().process_frame(frame, direction)
+        if isinstance(frame, InputAudioRawFrame):
+            self.waiting += frame.num_frames / frame.sample_rate
+            self.most = max(self.most, self.waiting)
+            asyncio.get_running_loop().call_later(0.2, self.work, frame)
+
+    def work(self, frame):
+        self.waiting -= frame.num_frames / frame.sample_rate
+
+
+async def test_no_more_sound_waits_than_a_recogniser_would_take():
+    slow = Slow()
+    assert [frame async for frame in run(slow, heard(np.zeros(RATE * 90, np.int16)), 60)]
+    assert 5 < slow.most < MOST_AHEAD + 2
