@@ -19,6 +19,9 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 MOST_NOTES = 64 << 20
 """Bytes of a file that `read_small` reads."""
 
+MOST_ABOUT = 16 << 20
+"""Bytes of a file of JSON that says what a folder is; parsed it takes up to forty times as much."""
+
 MOST_BYTES = 4 << 30
 """Bytes of a large file, such as a table of points, that `read_small` reads where it is told to."""
 
@@ -90,22 +93,25 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def read_object(file: Path) -> dict[str, Any]:
-    """The object in a file of JSON, which may be anybody's; empty where there is none."""
+    """The object in a file of JSON, which may be anybody's; empty where there is none.
+
+    One of more than `MOST_ABOUT` bytes counts as none.
+    """
     try:
-        content = json_of(file)
+        content = json_of(file, most=MOST_ABOUT)
     except (OSError, ValueError):
         return {}
     return cast(dict[str, Any], content) if isinstance(content, dict) else {}
 
 
-def json_of(file: Path, links: bool = True) -> Any:
-    """What a file of JSON holds, which may be anybody's; `links` as for `read_small`.
+def json_of(file: Path, links: bool = True, most: int | None = None) -> Any:
+    """What a file of JSON holds, which may be anybody's; `links` and `most` as for `read_small`.
 
     Raises:
         OSError: If it is not there, no regular file, or too large.
         ValueError: If it is no JSON in UTF-8, or nested too deep.
     """
-    return loose_json(read_small(file, links))
+    return loose_json(read_small(file, links, most))
 
 
 def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes:

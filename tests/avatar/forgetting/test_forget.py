@@ -1,15 +1,18 @@
 """`ico3d forget`: a project of two people, of which one goes."""
 
+import fcntl
 import json
 import os
 import sys
 import time
+import tracemalloc
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from ico3d.avatar.forgetting import holdings
 from ico3d.avatar.forgetting.choosing import (
     ELSEWHERE,
     belonging,
@@ -23,6 +26,7 @@ from ico3d.bundle.archive import write_zip
 from ico3d.bundle.format import write_bundle
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
+from ico3d.common.files import MOST_ABOUT
 from support.bundles.random_bundle import random_files, random_head, random_manifest
 from support.recordings.multiview_folders import entry, ring, write_cameras
 from support.strangers.nested import nested
@@ -202,6 +206,56 @@ def test_links_go_and_what_they_lead_to_is_named(project, tmp_path, capsys):
     assert f"- {elsewhere}, to which {project}/captures/linked led" in said
 
 
+def test_many_links_to_one_place_are_looked_at_once(project, tmp_path, monkeypatch):
+    """Each look reads files that may be large."""
+    elsewhere, looked = recording(tmp_path / "archive", likeness="Ada"), []
+    for number in range(5):
+        (project / f"captures/linked{number}").symlink_to(elsewhere)
+    real = holdings.read_object
+    monkeypatch.setattr(holdings, "read_object", lambda file: looked.append(file) or real(file))
+    assert main(["forget", "Ada", "--yes"]) == 0
+    assert there(project) == OTHERS | {"ada.mp4"}
+    assert len([file for file in looked if file.parent.name.startswith("linked")]) == 1
+
+
+def test_no_large_file_is_taken_for_what_says_whose_something_is(tmp_path):
+    """Parsed, it would take forty times its size, and as a link as often as there are names."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a/avatar.json").write_text('{"a": [' + "[]," * (MOST_ABOUT // 3) + "0]}")
+    for name in ("body.json", "head.json", "settings.json"):
+        (tmp_path / "a" / name).symlink_to("avatar.json")
+    tracemalloc.start()
+    assert holdings.find_holdings(tmp_path) == []
+    assert tracemalloc.get_traced_memory()[1] < 4 * MOST_ABOUT
+    tracemalloc.stop()
+
+
+LOCKED = {
+    "a training": "models/tried/settings.json",
+    "a training within": "models/ada/body/0000/settings.json",
+    "ico3d create": "captures/face/lock",
+    "a recording": "captures/hall",
+}
+
+
+@pytest.mark.parametrize("name", LOCKED.values(), ids=LOCKED)
+def test_what_somebody_works_at_is_not_removed(project, capsys, name):
+    """They would write there again, and nobody would know whose it is."""
+    file = project / name
+    if not file.exists():
+        file.touch()
+    opened = os.open(file, os.O_RDONLY)
+    fcntl.flock(opened, fcntl.LOCK_EX)
+    before = there(project)
+    assert main(["forget", "Ada", "--yes"]) == 1
+    place = file if file.is_dir() else file.parent
+    assert f"a process works at {place} just now" in capsys.readouterr().err
+    assert there(project) == before
+    os.close(opened)
+    assert main(["forget", "Ada", "--yes"]) == 0
+    assert there(project) == OTHERS | {"ada.mp4"}
+
+
 def test_damaged_things_are_no_obstacle(project):
     (project / "captures/hall/cameras.json").write_text("{")
     (project / "old.ico3d").write_bytes(b"no bundle")
@@ -314,12 +368,12 @@ def test_a_chain_of_thousands_of_models_takes_seconds_not_days(tmp_path):
     """Each was made of the next one, of which the last one shows somebody."""
     paths = [tmp_path / f"{number:04}" for number in range(3000)]
     chain = [Holding(path, "a model", (), (origin,)) for path, origin in pairwise(paths)]
-    holdings = [*chain, Holding(paths[-1], "a model", ("Eve",)), Holding(tmp_path / "b", "", ())]
+    links = [*chain, Holding(paths[-1], "a model", ("Eve",)), Holding(tmp_path / "b", "", ())]
     begin = time.process_time()
-    chosen = belonging(holdings, [], {"eve"})
+    chosen = belonging(links, [], {"eve"})
     assert [one.path for one in chosen] == paths == outermost(paths)
     assert len(within(paths, chosen)) == len(paths)
-    assert len(list(remaining(holdings, chosen, paths))) == 1 + len(ELSEWHERE)
+    assert len(list(remaining(links, chosen, paths))) == 1 + len(ELSEWHERE)
     assert time.process_time() - begin < 2
 
 

@@ -37,13 +37,14 @@ class Forget:
 
         Raises:
             SettingsError: If nobody is named, nothing belongs to them, a path lies outside of the
-                project, nobody is there to agree, or something cannot be removed.
+                project, nobody is there to agree, a process works at something of it, or something
+                cannot be removed.
         """
         from rich.console import Console
 
         from ico3d.avatar.forgetting.choosing import belonging, outermost, remaining, within
         from ico3d.avatar.forgetting.holdings import find_holdings
-        from ico3d.avatar.forgetting.removal import remove, with_tracks
+        from ico3d.avatar.forgetting.removal import check_idle, remove, with_tracks
         from ico3d.errors import printable
 
         console = Console(highlight=False, soft_wrap=True, markup=False)
@@ -57,6 +58,7 @@ class Forget:
         for path, inside in within(theirs, chosen).items():
             console.print(printable(f"{path}{_described(inside)}"))
         self._ask(len(theirs))
+        check_idle(theirs)
         targets = remove(theirs)
         console.print(f"{len(theirs)} removed. What may remain elsewhere, and is not removed:")
         for sentence in (*targets, *remaining(holdings, chosen, theirs)):

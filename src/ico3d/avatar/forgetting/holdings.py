@@ -1,7 +1,8 @@
 """What a project folder holds of people: recordings, models, runs, bundles, and whose they are."""
 
+import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ico3d.avatar.models import KINDS
@@ -35,6 +36,8 @@ WORK, ABOUT = ".work", "about.json"
 """Suffix and mark of folders in which `ico3d create` makes avatars, each beside its bundle."""
 BUNDLE, ZIP = ".ico3d", b"PK\3\4"
 """How names of bundles end, and how their content begins under whichever name."""
+PARTS = ("capture", "head", "body")
+"""Entries of a model's summary that say whom it shows."""
 MODELS = tuple(kind.file for kind in KINDS if kind.model is not Bundle)
 
 
@@ -74,12 +77,17 @@ def find_holdings(project: Path) -> list[Holding]:
 
 
 def _walk(project: Path) -> Iterator[Holding]:
+    led_to: dict[str, Holding | None] = {}  # by real paths: a thousand links may lead to one place
     for folder, folders, files in walk(project):
         folders[:] = sorted(n for n in folders if not n.startswith(".") or is_unfinished(n))
-        linked = (folder / name for name in folders if (folder / name).is_symlink())
-        for candidate in (folder, *linked):
-            if candidate != project and (found := _folder(candidate)) is not None:
-                yield found
+        if folder != project and (found := _folder(folder)) is not None:
+            yield found
+        for link in (folder / name for name in folders if (folder / name).is_symlink()):
+            place = os.path.realpath(link)
+            if place not in led_to:
+                led_to[place] = _folder(link)
+            if (found := led_to[place]) is not None:
+                yield replace(found, path=link)
         for file in (folder / name for name in sorted(files)):
             if (found := _file(file)) is not None:
                 yield found
@@ -94,17 +102,35 @@ def _folder(folder: Path) -> Holding | None:
         return _bundle(folder)
     if (folder / ABOUT).is_file() and (found := _workplace(folder)) is not None:
         return found
-    run, models = read_object(folder / RUN), [read_object(folder / name) for name in MODELS]
-    if not any(models) and "capture" not in run:
+    is_run, made_of = _training(folder)
+    models = [_shown(folder / name) for name in MODELS]
+    is_model = any(names is not None for names in models)
+    if not is_model and not is_run:
         hidden = is_unfinished(folder.name)
         return Holding(folder, "an unfinished recording", ()) if hidden else None
+    named = _named(*(name for names in models for name in names or ()))
+    what = "a model" if is_model else "an unfinished training"
+    return Holding(folder, what, named, made_of)
+
+
+def _training(folder: Path) -> tuple[bool, tuple[Path, ...]]:
+    """Whether there was a training in a folder, and what it says that it was made of."""
+    run = read_object(folder / RUN)
     stated = [text for name in MADE_OF if isinstance(text := run.get(name), str)]
-    made_of = [Path(text) for text in stated if len(text) < LONGEST]
-    parts = [part for model in models if isinstance(part := model.get("summary"), dict)]
-    shown = [part.get(key, {}) for part in parts for key in ("capture", "head", "body")]
-    names = [about.get("likeness", "") for about in shown if isinstance(about, dict)]
-    what = "a model" if any(models) else "an unfinished training"
-    return Holding(folder, what, _named(*map(str, names)), tuple(made_of))
+    return "capture" in run, tuple(Path(text) for text in stated if len(text) < LONGEST)
+
+
+def _shown(file: Path) -> list[str] | None:
+    """Whom a model shows, as its file states it; None where there is no such file.
+
+    Of the file nothing else is kept: it may be large.
+    """
+    model = read_object(file)
+    if not model:
+        return None
+    summary = model.get("summary")
+    parts = [summary.get(key) for key in PARTS] if isinstance(summary, dict) else []
+    return [str(part.get("likeness", "")) for part in parts if isinstance(part, dict)]
 
 
 def _workplace(folder: Path) -> Holding | None:

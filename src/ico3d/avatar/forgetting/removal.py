@@ -8,12 +8,31 @@ from ico3d.capture.headpose.track_file import track_file as head_track_file
 from ico3d.common.files import walk
 from ico3d.errors import SettingsError
 from ico3d.rig.body_track import track_file as body_track_file
+from ico3d.training.notes.lock import is_locked
+
+LOCKS = ("settings.json", "lock")
+"""Files that are locked while somebody works in their folder: a training, `ico3d create`."""
 
 
 def with_tracks(paths: Sequence[Path]) -> list[Path]:
     """The paths, and beside recordings that are files the tracks of head and body."""
     beside = [track(path) for path in paths for track in (head_track_file, body_track_file)]
     return [*paths, *(file for file in beside if file.is_file())]
+
+
+def check_idle(paths: Sequence[Path]) -> None:
+    """Refuses to remove what a process works at: it would write there again.
+
+    Raises:
+        SettingsError: If one does; the sentence names the folder.
+    """
+    for path in paths:
+        for place, _, files in walk(path) if not path.is_symlink() else ():
+            if any(map(is_locked, (place, *(place / name for name in LOCKS if name in files)))):
+                raise SettingsError(
+                    f"a process works at {place} just now, and would write there again: wait for "
+                    "its end, or end it. Nothing was removed."
+                )
 
 
 def remove(paths: Sequence[Path]) -> list[str]:

@@ -105,14 +105,19 @@ def lets_go(train: Callable[P, T]) -> Callable[P, T]:
 
 
 def is_locked(file: Path) -> bool:
-    """Whether a process holds the lock of a file; False where there is no such file."""
-    if not file.is_file():  # nobody opens a pipe on the other side
+    """Whether a process holds the lock of a file or folder; False where there is none."""
+    if not (file.is_file() or file.is_dir()):  # nobody opens a pipe on the other side
         return False
     try:
-        with file.open("rb") as opened:
-            fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        opened = os.open(file, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
     except OSError:
         pass
+    finally:
+        os.close(opened)
     return False
