@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ico3d.cli import main
+from ico3d.common.unpacking import memory
 from ico3d.errors import GaussianFileError, SettingsError
 from ico3d.splat.files.formats import read_file, read_gaussians, write_gaussians
 from support.splats.gaussian_files import as_gsply, gsply, random_gaussians, same, splat_bytes
@@ -112,6 +113,16 @@ def test_other_files_are_refused_in_one_sentence(tmp_path, data):
     (tmp_path / "a.ply").write_bytes(data)
     with pytest.raises(GaussianFileError, match=r"a\.ply: no 3D Gaussians .* at byte 0"):
         read_gaussians(tmp_path / "a.ply")
+
+
+def test_a_file_that_takes_more_than_the_memory_is_refused(tmp_path, monkeypatch):
+    """A hole of a file: a disk holds it in no bytes."""
+    path = tmp_path / "a.splat"
+    with path.open("wb") as file:
+        file.truncate(3200)
+    monkeypatch.setattr(memory, "free_memory", lambda: 8 * 3200 - 1)
+    with pytest.raises(GaussianFileError, match="the free memory is enough for"):
+        read_file(path)
 
 
 def test_missing_files_folders_and_unknown_names_are_refused(tmp_path):

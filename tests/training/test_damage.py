@@ -6,8 +6,8 @@ import tracemalloc
 import pytest
 import torch
 
+from ico3d.common.unpacking import memory
 from ico3d.errors import ModelError
-from ico3d.training import checkpoint
 from ico3d.training.checkpoint import load_sealed, load_tensors, save_sealed, save_tensors
 from ico3d.training.log import MetricsLog
 from ico3d.training.loop import LoopSettings, run_loop
@@ -158,8 +158,8 @@ def test_a_file_that_claims_more_than_the_memory_holds_is_refused(tmp_path, monk
     file = tmp_path / "model.safetensors"
     save_tensors(file, {"means": torch.zeros(300)}, {})
     size = file.stat().st_size
-    monkeypatch.setattr(checkpoint, "free_memory", lambda: 4 * size)
+    monkeypatch.setattr(memory, "free_memory", lambda: 4 * size)
     assert len(load_tensors(file)[0]["means"]) == 300
-    monkeypatch.setattr(checkpoint, "free_memory", lambda: 4 * size - 1)
+    monkeypatch.setattr(memory, "free_memory", lambda: 4 * size - 1)
     with pytest.raises(ModelError, match=r"has 0\.0 GiB; the free memory is enough for 0\.0\.$"):
         load_tensors(file)

@@ -30,7 +30,7 @@ from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
-from ico3d.common.files import MOST_BYTES, read_small
+from ico3d.common.files import read_small
 from ico3d.errors import BundleError
 from ico3d.motion.clip import Clip
 from ico3d.motion.recorded.cut import Cut
@@ -253,7 +253,7 @@ def read_background(path: Path) -> dict[str, bytes]:
     if name not in BACKGROUNDS:
         raise BundleError(f"{path}: splats behind a person must be named .spz or .ply.")
     try:
-        data = read_small(path, most=MOST_BYTES)
+        data = read_small(path, most=limits.MAX_BACKGROUND_BYTES)
     except OSError as error:
         raise BundleError(f"{path}: cannot be read ({error.strerror}).") from error
     check_background(data, name)

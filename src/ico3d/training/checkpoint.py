@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import loose_json
-from ico3d.common.unpacking.memory import free_memory
+from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import ModelError
 from ico3d.training.finite import all_finite
 
@@ -135,12 +135,10 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
 
 
 def _check_room(path: Path) -> None:
-    """Refuses a file that takes all of the memory; a disk may hold it in a few bytes, as a hole."""
-    size, most = path.stat().st_size, free_memory() // _COPIES
-    if size > most:
-        raise ModelError(
-            f"{path} has {size / 2**30:.1f} GiB; the free memory is enough for {most / 2**30:.1f}."
-        )
+    """Refuses a file that takes all of the memory."""
+    lacking = lacks_room(path, _COPIES)
+    if lacking:
+        raise ModelError(f"{path} {lacking}.")
 
 
 def load_sealed(path: Path) -> tuple[dict[str, Tensor], dict]:

@@ -1,13 +1,44 @@
 """Foreign recordings that claim more than they hold."""
 
+import struct
+import time
 import tracemalloc
 
 import pytest
 
+from ico3d.capture.importing.colmap import MOST_POINTS
+from ico3d.capture.importing.foreign import inside
 from ico3d.capture.importing.recording import import_recording
 from ico3d.capture.importing.settings import ImportSettings
+from ico3d.common.unpacking import memory
 from ico3d.errors import CaptureError
 from support.recordings import foreign_models
+
+
+@pytest.mark.parametrize("mine", [0, 30])
+def test_a_binary_table_of_colmap_that_claims_much_is_not_kept(tmp_path, monkeypatch, mine):
+    """A hole of a file: a disk holds it in no bytes."""
+    root = foreign_models.write_colmap(tmp_path, foreign_models.poses(2), "OPENCV", True)
+    with (root / "sparse/0/points3D.bin").open("r+b") as file:
+        file.write(struct.pack("<Q", MOST_POINTS + 1))
+        file.truncate(mine << 20)
+    if mine:
+        monkeypatch.setattr(memory, "free_memory", lambda: 80 << 20)
+    sentence = "the free memory is enough for" if mine else "damaged or cut off"
+    with pytest.raises(CaptureError, match=sentence):
+        import_recording(root, tmp_path / "out", ImportSettings())
+    if mine:
+        monkeypatch.undo()
+        with pytest.raises(CaptureError, match=f"states {MOST_POINTS + 1} points"):
+            import_recording(root, tmp_path / "out", ImportSettings())
+
+
+def test_a_name_of_a_million_folders_is_refused_at_once(tmp_path):
+    """To resolve it would take the square of its parts."""
+    begun = time.process_time()
+    with pytest.raises(CaptureError, match="no picture has a name of 2000005 letters"):
+        inside(tmp_path, "a/" * 1_000_000 + "b.png", "images.txt")
+    assert time.process_time() - begun < 1
 
 
 def test_a_table_of_colmap_that_claims_much_is_not_kept(tmp_path):

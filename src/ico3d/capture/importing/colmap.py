@@ -9,6 +9,7 @@ import numpy as np
 from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside, take_once
 from ico3d.capture.lens import Lens
 from ico3d.common.files import MOST_BYTES, check_regular, read_small
+from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import CaptureError
 
 MODELS = {
@@ -21,6 +22,8 @@ MODELS = {
 }
 """Supported camera models: number, name and number of parameters."""
 ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
+MOST_POINTS = 20_000_000
+"""Points of a binary model that are read; models of large places have some millions."""
 LONGEST_LINE = 1 << 24
 """Letters of a line, of which all points of a picture take one."""
 Pose = tuple[str, int, np.ndarray]
@@ -154,6 +157,8 @@ class _Bytes:
     """A binary file read from front to back."""
 
     def __init__(self, file: Path):
+        if lacking := lacks_room(file, 3):
+            raise CaptureError(f"{file} {lacking}.")
         self._data, self._at = read_small(file, most=MOST_BYTES), 0
 
     def take(self, layout: str) -> tuple:
@@ -198,8 +203,12 @@ def _binary_poses(file: Path) -> Iterator[Pose]:
 
 def _binary_points(file: Path) -> np.ndarray:
     """points3D.bin, (P, 3)."""
-    data, rows = _Bytes(file), []
-    for _ in range(data.take("Q")[0]):
-        rows.append(data.take("Q3d3Bd")[1:4])
+    data = _Bytes(file)
+    count = data.take("Q")[0]
+    if count > MOST_POINTS:
+        raise CaptureError(f"{file} states {count} points: at most {MOST_POINTS} are read.")
+    points = np.empty((count, 3), np.float32)
+    for row in points:
+        row[:] = data.take("Q3d3Bd")[1:4]
         data.skip(data.take("Q")[0], 8)
-    return np.array(rows, np.float32).reshape(-1, 3)
+    return points

@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.capture.decoding import size_of
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.files import PICTURES
+from ico3d.common.files import LONGEST
 from ico3d.errors import CaptureError
 
 SAME_SHAPE = 0.01
@@ -62,6 +63,8 @@ def inside(folder: Path, name: str, what: str) -> Path:
         CaptureError: If the file lies elsewhere, is missing, or has an unknown format.
     """
     root = folder.resolve()
+    if len(name) > LONGEST:  # to resolve it would take the square of its parts
+        raise CaptureError(f"{what}: no picture has a name of {len(name)} letters.")
     try:
         path = (root / name).resolve()
         found = next(p for p in (path, *_suffixed(path)) if p.is_file())

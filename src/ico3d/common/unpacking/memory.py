@@ -12,6 +12,24 @@ def free_memory() -> int:
     return free if group is None else min(free, group)
 
 
+def lacks_room(path: Path, times: int) -> str:
+    """What is wrong with a file that takes too much memory; empty if it does not.
+
+    A disk may hold it in a few bytes, as a hole.
+
+    Args:
+        path: The file.
+        times: How many times its size reading it takes.
+
+    Raises:
+        OSError: If it is not there.
+    """
+    size, most = path.stat().st_size, free_memory() // times
+    if size <= most:
+        return ""
+    return f"has {size / 2**30:.1f} GiB; the free memory is enough for {most / 2**30:.1f}"
+
+
 def _own_group() -> Path:
     """The folder of this process's control group, version 2."""
     try:

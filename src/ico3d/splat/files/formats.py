@@ -5,12 +5,15 @@ from pathlib import Path
 
 from ico3d.common.files import MOST_BYTES, read_small, write_atomic
 from ico3d.common.spz.container import GZIP_MAGIC, MAGIC
+from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import GaussianFileError, SettingsError
 from ico3d.splat.files import compressed_ply, ply, splat, spz, standard_ply
 from ico3d.splat.files.raw import RawGaussians
 
 _WRITERS = {".ply": standard_ply.write, ".spz": spz.write}
 _HEAD_BYTES = 64 * 32
+_TIMES = 8
+"""How many times its size a file may take while it is read."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ def read_file(path: Path | str) -> GaussianFile:
     """Reads a file of 3D Gaussians and names its format; errors as for `read_gaussians`."""
     path = Path(path)
     try:
+        if lacking := lacks_room(path, _TIMES):
+            raise GaussianFileError(f"it {lacking}")
         data = read_small(path, most=MOST_BYTES)
         kind = _recognise(data[:_HEAD_BYTES], path)
         named, gaussians = _read(kind, data)
