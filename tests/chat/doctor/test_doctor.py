@@ -179,6 +179,19 @@ def test_cookies_of_a_proxy_are_kept():
         client = fetching.Client(url)
         fetching.fetch(client, "/")
     assert dict(client.cookies) == {"place": "3"}
+    assert client.cookies_for("/ws") == "place=3"
+
+
+def test_odd_cookies_are_no_obstacle():
+    """One name for two paths, as honest proxies do, and letters that no header can hold."""
+    for cookie, kept in (("a=2; Path=/ws", "a=2; a=1"), ("b=caf\xe9; Path=/", "a=1")):
+        with answering({"Set-Cookie": "a=1; Path=/"}, []) as url:
+            client = fetching.Client(url)
+            fetching.fetch(client, "/health")
+        with answering({"Set-Cookie": cookie}, []) as other:
+            client = fetching.Client(other, cookies=client.cookies)
+            fetching.fetch(client, "/ws")
+        assert client.cookies_for("/ws") == kept
 
 
 async def test_what_breaks_off_is_a_finding():

@@ -233,6 +233,27 @@ async def test_a_request_that_never_comes_gives_its_place_back(monkeypatch):
         writer.close()
 
 
+async def test_a_request_that_drips_gives_its_place_back(monkeypatch):
+    """A byte now and then is no reason to go on waiting."""
+    monkeypatch.setattr(door, "SILENCE", 0.5)
+    async with serving(service_app("language", make_language, Limits(requests=1))) as url:
+        address = httpx.URL(url)
+        reader, writer = await asyncio.open_connection(address.host, address.port)
+        head = "POST /v1/chat/completions HTTP/1.1", f"Host: {address.netloc.decode()}"
+        kind = "Content-Type: application/json", "Content-Length: 1000"
+        writer.write("\r\n".join((*head, *kind, "", "{")).encode())
+
+        async def drip():
+            while True:
+                await asyncio.sleep(0.1)
+                writer.write(b" ")
+
+        dripping = asyncio.create_task(drip())
+        assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
+        dripping.cancel()
+        writer.close()
+
+
 async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
     monkeypatch.setattr(door, "SILENCE", 0.5)
     body = json.dumps({"input": "One two three four five six seven. " * 116}).encode()  # 9 MB

@@ -112,9 +112,8 @@ def of_site(client: Client, place: Place, context: ssl.SSLContext, key: str) -> 
     yield bundle
     if bundle.grade != "good":
         return
-    cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
     secured = context if place.scheme == "https" else None
-    visitor = visit.Visitor(place.url, secured, cookies, token)
+    visitor = visit.Visitor(place.url, secured, client.cookies_for("/ws"), token)
     yield from asyncio.run(visitor.findings())
 
 

@@ -57,6 +57,12 @@ class Client:
     verify: Any = True
     cookies: httpx.Cookies = field(default_factory=httpx.Cookies)
 
+    def cookies_for(self, path: str) -> str:
+        """The header Cookie of a request; empty where there are no cookies for the path."""
+        request = httpx.Request("GET", f"{self.url}{path}")
+        self.cookies.set_cookie_header(request)
+        return request.headers.get("Cookie", "")
+
 
 def fetch(client: Client, path: str, method: str = "GET", **request: Any) -> Answer:
     """Asks a server, which is waited for `PATIENCE` seconds, however its answer drips.
@@ -93,4 +99,7 @@ async def _fetched(client: Client, path: str, method: str, request: dict[str, An
                     if len(body) > MOST_BYTES:
                         break
         await answer.aclose()
+        for cookie in list(client.cookies.jar):
+            if not f"{cookie.name}{cookie.value}".isascii():  # which no header could hold
+                client.cookies.jar.clear(cookie.domain, cookie.path, cookie.name)
         return Answer(answer.status_code, answer.headers, bytes(body[:MOST_BYTES]))

@@ -17,6 +17,8 @@ SILENCE = 10.0
 
 So is an answer of which nothing is read for as long.
 """
+PACE = 20_000
+"""Bytes per second, beyond the first seconds, at which a request has to come: it holds a place."""
 BROKEN, BUSY = 1008, 1013  # WebSocket close codes
 
 
@@ -64,7 +66,8 @@ class Body:
     def __init__(self, limits: Limits, scope: Scope, receive: Receive, send: Send):
         """Bounds what `receive` brings; answers through `send`."""
         self._megabytes, self._scope = limits.megabytes, scope
-        self._end = asyncio.get_running_loop().time() + limits.seconds
+        self._begun = asyncio.get_running_loop().time()
+        self._end = self._begun + limits.seconds
         self._is_whole = scope["type"] != "http"
         self._receive, self._send = receive, send
         self._taken, self._refused = 0, False
@@ -100,8 +103,11 @@ class Body:
 
     def _patience(self) -> float | None:
         """Seconds in which more has to come; None where all is here."""
-        left = self._end - asyncio.get_running_loop().time()
-        return None if self._is_whole else min(SILENCE, left)
+        if self._is_whole:
+            return None
+        now = asyncio.get_running_loop().time()
+        due = self._begun + SILENCE + self._taken / PACE
+        return min(SILENCE, due - now, self._end - now)
 
     @property
     def _is_over(self) -> bool:
