@@ -50,6 +50,15 @@ export class Album {
   }
 }
 
+/**
+ * Writes what somebody sees of a page now as a picture of its own.
+ *
+ * @param file of `docs/images`
+ */
+export async function publish(page: Page, file: string): Promise<void> {
+  writeFileSync(join(REPOSITORY, 'docs/images', file), await smallEnough(page));
+}
+
 /** The page as a JPEG of the best quality that is small enough. */
 async function smallEnough(page: Page): Promise<Buffer> {
   for (let quality = BEST; quality >= WORST; quality -= STEP) {

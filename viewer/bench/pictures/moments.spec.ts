@@ -7,7 +7,7 @@ import { Browser } from '../../support/browser/browser.ts';
 import { makeVoice } from '../../support/browser/talk.ts';
 import { drawnBy } from '../../support/browser/path.ts';
 import { scratchFolder } from '../../support/scratch.ts';
-import { Album } from './album.ts';
+import { Album, publish } from './album.ts';
 import { ask, Line, QUESTION, silent } from './visitor.ts';
 
 const SIZES = { desk: { width: 1280, height: 800 }, hand: { width: 390, height: 844 } };
@@ -36,6 +36,7 @@ async function moments(album: Album, place: string, size: { width: number; heigh
   await page.emulateMedia({ colorScheme: 'light', reducedMotion: 'no-preference' });
   await browser.open(drawnBy('soft', demoUrl!));
   await atStroke(page, cues, 0, () => true);
+  if (place === 'desk') await publish(page, 'demo.jpg'); // the README's first
   await album.shoot(page, `Greeting (${place})`);
   await silent(page);
   await ask(page, QUESTION);
