@@ -1,6 +1,7 @@
 """A trained head with everything needed to drive it, as a model folder stores it."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
@@ -170,11 +171,10 @@ class TrainedHead:
         return cls(model, inputs, names, *encoder, adaptor, summary, landmarks, eyes, turn)
 
 
-def _check_driven(inputs: object, *words: object) -> None:
+def _check_driven(inputs: object, names: Iterable[object], *encoder: object) -> None:
     """Raises ValueError if a folder does not say in words what drives its head."""
     if inputs not in get_args(Inputs):
         raise ValueError(f"nothing called {inputs!r:.40} drives heads")
-    names, *encoder = words
     if not all(isinstance(word, str) for word in (*names, *encoder)):
         raise ValueError("it names blendshapes or its encoder by something else than words")
 
