@@ -30,6 +30,7 @@ from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connect
 from ico3d.chat.serving.network.websocket import BoundedWebSocket
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.refusals import Refusals
+from ico3d.chat.serving.running.alive import told_alive
 from ico3d.chat.serving.running.ending import PatientServer
 from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.serving.sites import Sites, add_tokens
@@ -95,7 +96,8 @@ def make_app(
         gc.freeze()  # what stays need not be looked at when a session's memory is freed
         if sessions is not None:
             sessions.monitor.watch(asyncio.get_running_loop())
-        yield
+        async with told_alive():
+            yield
         if sessions is not None:
             await sessions.close_all()
 
