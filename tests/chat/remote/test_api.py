@@ -1,6 +1,7 @@
 """The OpenAI SDK talks to our modules, which are the real offline three over real HTTP."""
 
 import asyncio
+import contextlib
 import io
 import json
 import socket
@@ -216,32 +217,34 @@ async def test_more_requests_than_allowed_are_told_to_wait():
         assert json.loads((await plain.get("/health")).text)["ok"]
 
 
+@contextlib.asynccontextmanager
+async def begun(url):
+    """A request of which only the beginning has come."""
+    address = httpx.URL(url)
+    reader, writer = await asyncio.open_connection(address.host, address.port)
+    head = "POST /v1/chat/completions HTTP/1.1", f"Host: {address.netloc.decode()}"
+    kind = "Content-Type: application/json", "Content-Length: 1000"
+    writer.write("\r\n".join((*head, *kind, "", "{")).encode())
+    yield reader, writer
+    writer.close()
+
+
 async def test_a_request_that_never_comes_gives_its_place_back(monkeypatch):
     monkeypatch.setattr(door, "SILENCE", 0.5)
     ask = {"messages": [{"role": "user", "content": "who are you"}]}
-    async with serving(service_app("language", make_language, Limits(requests=1))) as url:
-        address = httpx.URL(url)
-        reader, writer = await asyncio.open_connection(address.host, address.port)
-        head = "POST /v1/chat/completions HTTP/1.1", f"Host: {address.netloc.decode()}"
-        kind = "Content-Type: application/json", "Content-Length: 1000"
-        writer.write("\r\n".join((*head, *kind, "", "{")).encode())
+    app = service_app("language", make_language, Limits(requests=1))
+    async with serving(app) as url, begun(url) as (reader, _), visiting(url) as http:
         await asyncio.sleep(0.2)
-        async with visiting(url) as http:
-            assert (await http.post("v1/chat/completions", json=ask)).status_code == 429
-            assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
-            assert (await http.post("v1/chat/completions", json=ask)).status_code == 200
-        writer.close()
+        assert (await http.post("v1/chat/completions", json=ask)).status_code == 429
+        assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
+        assert (await http.post("v1/chat/completions", json=ask)).status_code == 200
 
 
 async def test_a_request_that_drips_gives_its_place_back(monkeypatch):
     """A byte now and then is no reason to go on waiting."""
     monkeypatch.setattr(door, "SILENCE", 0.5)
-    async with serving(service_app("language", make_language, Limits(requests=1))) as url:
-        address = httpx.URL(url)
-        reader, writer = await asyncio.open_connection(address.host, address.port)
-        head = "POST /v1/chat/completions HTTP/1.1", f"Host: {address.netloc.decode()}"
-        kind = "Content-Type: application/json", "Content-Length: 1000"
-        writer.write("\r\n".join((*head, *kind, "", "{")).encode())
+    app = service_app("language", make_language, Limits(requests=1))
+    async with serving(app) as url, begun(url) as (reader, writer):
 
         async def drip():
             while True:
@@ -251,7 +254,6 @@ async def test_a_request_that_drips_gives_its_place_back(monkeypatch):
         dripping = asyncio.create_task(drip())
         assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
         dripping.cancel()
-        writer.close()
 
 
 async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
