@@ -80,6 +80,59 @@ async def test_texts_are_utf_8_whatever_their_type_says():
     assert response.text == said
 
 
+@pytest.mark.parametrize("status", [200, 400, 503])
+async def test_errors_are_short(status):
+    """The SDK makes objects of them, and a text of those."""
+    from ico3d.chat.services import bounded
+
+    async def sent():
+        for _ in range(2):
+            yield b"a" * (bounded.MOST_OF_ERROR // 2 + 1)
+
+    response = httpx2.Response(status, content=sent())
+    await bounded.bound(response)
+    if status == 200:
+        assert len(await response.aread()) > bounded.MOST_OF_ERROR
+    else:
+        with pytest.raises(httpx2.ReadError, match="too large"):
+            await response.aread()
+
+
+async def test_a_call_has_short_arguments(monkeypatch):
+    from openai.types.chat import ChatCompletionChunk
+    from pipecat.services.openai.llm import OpenAILLMService
+
+    from ico3d.chat.services.language import compatible
+
+    call = {"index": 0, "function": {"name": "mood", "arguments": "a" * 1000}}
+    choice = {"index": 0, "delta": {"tool_calls": [call]}}
+    about = {"id": "", "created": 0, "model": "", "object": "chat.completion.chunk"}
+    piece = ChatCompletionChunk.model_validate({**about, "choices": [choice]})
+
+    class Stream:
+        closed, sent = False, 0
+
+        async def __aiter__(self):
+            for _ in range(10_000):
+                self.sent += 1
+                yield piece
+
+        async def close(self):
+            self.closed = True
+
+    async def answered(self, context):
+        return stream
+
+    stream = Stream()
+    monkeypatch.setattr(OpenAILLMService, "get_chat_completions", answered)
+    model = object.__new__(compatible.CompatibleModel)
+    model._place = ("nowhere", "test")
+    with pytest.raises(httpx2.ReadError, match="arguments of its functions are too long"):
+        async for _ in await model.get_chat_completions(None):
+            pass
+    assert stream.closed and stream.sent == compatible.MOST_ARGUMENTS // 1000 + 1
+
+
 async def test_an_answer_calls_few_functions(monkeypatch):
     from pipecat.services.llm_service import FunctionCallFromLLM
     from pipecat.services.openai.llm import OpenAILLMService

@@ -141,6 +141,20 @@ async def test_a_program_is_started_and_its_functions_called(sdk, monkeypatch):
         os.kill(process, 0)
 
 
+@pytest.mark.real_time
+async def test_answers_are_compared_with_no_schema_of_the_server(sdk, monkeypatch):
+    """Its patterns may take for ever, and the server of visitors would wait for them."""
+    monkeypatch.setenv("PATH_OF_SDK", ":".join(filter(None, sys.path)))
+    environment = {"PYTHONPATH": "$PATH_OF_SDK"}
+    connection = Connection(McpServer("museum", COMMAND, environment=environment, seconds=30))
+    client = await connection._client()
+    await client.list_tools()
+    client.session._tool_output_schemas["opening_hours"] = {"required": ["nowhere"]}
+    told = await connection.call("opening_hours", {"day": "Monday"})
+    assert told == {"result": "On Monday from ten to six."}
+    await connection.close()
+
+
 async def asked(function, **arguments):
     """What the model is told of a call."""
     results = []

@@ -6,6 +6,7 @@ from contextvars import ContextVar
 from dataclasses import replace
 from typing import Any
 
+import httpx2
 from loguru import logger
 from openai import APIStatusError, AsyncOpenAI, AsyncStream
 from openai.types.chat import ChatCompletionChunk
@@ -24,6 +25,8 @@ from ico3d.chat.wire.characters import sendable, sendable_json
 
 MOST_ROUNDS = 4
 """How often a model may call functions in one turn before it must answer in words."""
+MOST_ARGUMENTS = 64 << 10
+"""Letters of the arguments of an answer's functions."""
 MOST_CALLS = 8
 """Functions that one answer may call: a visitor can talk a model into asking for many."""
 COMPLETE = ("stop", "tool_calls", "function_call")
@@ -129,11 +132,14 @@ class CompatibleModel(OpenAILLMService):
     ) -> AsyncGenerator[ChatCompletionChunk, None]:
         """The stream with what is said alone; signs of thinking go down beside it."""
         opens = _opens.get(self._place)
-        thoughts, end = Thoughts(False if opens is False else None), None
+        thoughts, end, letters = Thoughts(False if opens is False else None), None, 0
         async with contextlib.aclosing(_closing(stream)) as chunks:
             async for chunk in chunks:
                 for choice in chunk.choices or []:
                     end = choice.finish_reason or end
+                    letters += _letters_of_arguments(choice.delta)
+                    if letters > MOST_ARGUMENTS:
+                        raise httpx2.ReadError("the arguments of its functions are too long")
                     await self._take_apart(choice.delta, thoughts)
                 yield chunk
         if end == "length" and opens and not thoughts.begun:
@@ -211,6 +217,12 @@ async def _closing(
             yield chunk
     finally:
         await stream.close()
+
+
+def _letters_of_arguments(delta: ChoiceDelta | None) -> int:
+    """Letters of the arguments of functions in a piece of an answer."""
+    calls = (delta.tool_calls if delta else None) or []
+    return sum(len(call.function.arguments or "") for call in calls if call.function)
 
 
 def rounds(messages: list[dict[str, Any]]) -> int:
