@@ -8,10 +8,8 @@ from ico3d.capture.headpose.track_file import track_file as head_track_file
 from ico3d.common.files import walk
 from ico3d.errors import SettingsError
 from ico3d.rig.body_track import track_file as body_track_file
+from ico3d.training.listing.find_runs import ABOUT
 from ico3d.training.notes.lock import is_locked
-
-LOCKS = ("settings.json", "lock")
-"""Files that are locked while somebody works in their folder: a training, `ico3d create`."""
 
 
 def with_tracks(paths: Sequence[Path]) -> list[Path]:
@@ -28,7 +26,8 @@ def check_idle(paths: Sequence[Path]) -> None:
     """
     for path in paths:
         for place, _, files in walk(path) if not path.is_symlink() else ():
-            if any(map(is_locked, (place, *(place / name for name in LOCKS if name in files)))):
+            locks = [place / name for name in ABOUT.values() if name in files]
+            if any(map(is_locked, (place, *locks))):
                 raise SettingsError(
                     f"a process works at {place} just now, and would write there again: wait for "
                     "its end, or end it. Nothing was removed."
