@@ -19,12 +19,14 @@ from pathlib import Path
 import numpy as np
 import tyro
 
+from ico3d.avatar.embodying.builds.change import change_to
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import HEAD_REST
 from ico3d.bundle.packaged import FILE
 from ico3d.bundle.skinned.info import SKINNED_REST
 from ico3d.cli import run_script
 from ico3d.motion.recorded.cut import CUTS, to_toml
+from ico3d.rig.rig import Rig
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.rigs import cameras_of
@@ -38,6 +40,9 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 MAKER = "the authors of ico3d"
 LIGHT = "soft"
 """What an arm shades in the recording stays dark in every pose: its shade should be faint."""
+SLENDER = 0.8
+"""How far the subject's body is on the way to MakeHuman's slender build: the files' shoulders and
+sleeves are broad for their heads."""
 TRIED = 2
 """Cameras whose pictures are timed before recording."""
 
@@ -71,7 +76,7 @@ class Shot:
 
 HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
 """Two minutes of talk, each frame from another side; every second frame of a film would repeat."""
-BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=8)
+BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=10)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 7000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 4500 "
@@ -88,7 +93,8 @@ class Demo:
     """How to make it.
 
     Attributes:
-        subject: Subject file (.npz) of ico3d capture synthetic.
+        subject: Subject file (.npz) of ico3d capture synthetic; WORK gets one of the same name with
+            the body that is recorded.
         work: Folder for captures, models and pictures.
         licences: Notices that the subject's sources ask for.
         out: The bundle to write.
@@ -116,9 +122,14 @@ class Demo:
         work, seed = self.work, ("--seed", self.seed)
         for name in THREADS:
             os.environ[name] = str(self.threads)
+        person = work / self.subject.name
+        if not person.exists():
+            work.mkdir(parents=True, exist_ok=True)
+            np.savez_compressed(person, **slenderer(dict(np.load(self.subject)), SLENDER))
         # moods and glances are nothing that a voice could drive
-        self._record(work / "head-capture", "head", self.head_shot)
-        self._record(work / "body-capture", "body", self.body_shot, "--motion", "repertoire")
+        self._record(person, work / "head-capture", "head", self.head_shot)
+        body = (work / "body-capture", "body", self.body_shot)
+        self._record(person, *body, "--motion", "repertoire")
         self._train_head(work / "head-capture", work / "head")
         if not (work / "body-capture" / "body_track.safetensors").exists():
             ico3d("capture pose", work / "body-capture", "--workers", self.threads)
@@ -134,38 +145,20 @@ class Demo:
         ico3d("render", self.out, work / "gestures.mp4", "--gestures", *GESTURES)
         check(self.out)
 
-    def _record(self, capture: Path, rig: str, shot: Shot, *more: object) -> None:
+    def _record(self, subject: Path, capture: Path, rig: str, shot: Shot, *more: object) -> None:
         if (capture / "capture.json").exists():
             return
         pictures = shot.frames * shot.views
         left = pictures - sum(1 for _ in (capture / "masks").glob("*/*.png"))
-        each = self._seconds_of_a_picture(rig, shot)
+        each = _seconds_of_a_picture(subject, rig, shot)
         print(
             f"{capture.name}: {left} of {pictures} pictures are left, {each:.2f} s of processor "
             f"time each: {left * each / 3600:.1f} h.",
             flush=True,
         )
-        who = ("--subject", self.subject, "--seed", self.seed, "--rig", rig)
+        who = ("--subject", subject, "--seed", self.seed, "--rig", rig)
         who = (*who, "--no-lively", "--manner", "friendly", "--light", LIGHT)
         ico3d("capture synthetic", capture, *who, *shot.words(), *more, "--workers", self.threads)
-
-    def _seconds_of_a_picture(self, rig: str, shot: Shot) -> float:
-        """Processor time of a picture and its share of what a frame takes, from a few pictures."""
-        person = load_subject(str(self.subject), rig == "body")
-        studio = Studio(person, STUDIOS[LIGHT], "plain")
-        cameras = cameras_of(person, rig, shot.cameras, shot.size, shot.near)[-TRIED:]
-        pose = np.eye(4)
-        pose[:3, 3] = person.head_in_world
-        vertices = person.vertices.astype(np.float32)
-        for camera in cameras:  # the first pictures compile
-            studio.picture(camera, studio.figure(vertices, pose))
-        begun = time.process_time()
-        figure = studio.figure(vertices, pose)
-        prepared = time.process_time()
-        for camera in cameras:
-            studio.picture(camera, figure)
-        drawn = time.process_time()
-        return (drawn - prepared) / TRIED + (prepared - begun) / shot.views
 
     def _train_head(self, capture: Path, head: Path) -> None:
         options = ("--inputs", "speech", "--seed", self.seed, *self.head.split())
@@ -174,6 +167,39 @@ class Demo:
         ico3d("train head", capture, head, *options)
         if not (head / "metrics.json").exists():
             ico3d("evaluate", head, capture, "--json", head / "metrics.json")
+
+
+def slenderer(person: dict[str, np.ndarray], share: float) -> dict[str, np.ndarray]:
+    """The arrays of a subject file with a more slender body; head, hands and shoes stay.
+
+    Args:
+        person: The arrays.
+        share: How far to go to MakeHuman's slender build; 1 is all the way.
+    """
+    names, parents = person["joint_names"], person["joint_parents"]
+    places = person["joint_pos"].astype(np.float64)
+    rig = Rig(tuple(map(str, names)), tuple(map(int, parents)), places)
+    moves, _ = change_to("slender", rig).at(person["verts"].astype(np.float64))
+    return person | {"verts": (person["verts"] + share * moves).astype(np.float32)}
+
+
+def _seconds_of_a_picture(subject: Path, rig: str, shot: Shot) -> float:
+    """Processor time of a picture and its share of what a frame takes, from a few pictures."""
+    person = load_subject(str(subject), rig == "body")
+    studio = Studio(person, STUDIOS[LIGHT], "plain")
+    cameras = cameras_of(person, rig, shot.cameras, shot.size, shot.near)[-TRIED:]
+    pose = np.eye(4)
+    pose[:3, 3] = person.head_in_world
+    vertices = person.vertices.astype(np.float32)
+    for camera in cameras:  # the first pictures compile
+        studio.picture(camera, studio.figure(vertices, pose))
+    begun = time.process_time()
+    figure = studio.figure(vertices, pose)
+    prepared = time.process_time()
+    for camera in cameras:
+        studio.picture(camera, figure)
+    drawn = time.process_time()
+    return (drawn - prepared) / TRIED + (prepared - begun) / shot.views
 
 
 def check(path: Path) -> None:

@@ -14,6 +14,7 @@ from ico3d.errors import CaptureError, SettingsError
 from ico3d.studio.acting.acting import pose
 from ico3d.studio.acting.gestures import act
 from ico3d.studio.acting.limbs import reach, split_twist
+from ico3d.studio.person import npz_person
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
@@ -103,6 +104,26 @@ def test_at_rest_skin_stays_where_it_is(subject):
     np.testing.assert_allclose(
         bones.skinned(subject.vertices, matrices[0]), subject.vertices, atol=2e-6
     )
+
+
+def test_a_jumper_turns_from_trunk_to_arm_over_a_hands_breadth(subject, monkeypatch):
+    if subject.name != "human_face_m":
+        pytest.skip("the tubes have no armpits")
+    monkeypatch.setattr(npz_person, "SOFTER", 0)
+    hard = load_subject(str(HUMAN), whole=True)
+    steepest = []
+    for bones in (subject.skeleton, hard.skeleton):
+        np.testing.assert_allclose(bones.weights.sum(1), 1, atol=1e-5)
+        knit = subject.faces[subject.materials == Material.CLOTH]
+        apart = np.linalg.norm(subject.vertices[knit[:, 0]] - subject.vertices[knit[:, 1]], axis=1)
+        change = np.abs(bones.weights[knit[:, 0]] - bones.weights[knit[:, 1]]).sum(1)
+        at = bones.at[bones.index("upperarm01.L")]
+        near = np.linalg.norm(subject.vertices[knit[:, 0]] - at, axis=1) < 0.1
+        steepest.append(np.quantile((change / apart)[near], 0.98))
+    assert steepest[0] < 0.6 * steepest[1]
+    others = subject.materials != Material.CLOTH
+    kept = np.setdiff1d(subject.faces[others], subject.faces[~others])
+    np.testing.assert_array_equal(subject.skeleton.weights[kept], hard.skeleton.weights[kept])
 
 
 def test_a_bent_elbow_takes_the_hand_along_and_leaves_the_shoulder(subject):

@@ -12,7 +12,7 @@ from ico3d.studio.picture.eyeball import eye_rows
 from ico3d.studio.picture.fibres import overlay, strand_colors
 from ico3d.studio.picture.glass import glaze
 from ico3d.studio.picture.lamps import Lamps
-from ico3d.studio.picture.lighting import Lights, lights_on
+from ico3d.studio.picture.lighting import KEY, LOOKED_UP, RIM, Lights, lights_on
 from ico3d.studio.picture.materials import Colors
 from ico3d.studio.picture.occlusion import Sky
 from ico3d.studio.picture.paint import lip_gap, paint
@@ -139,7 +139,7 @@ class Studio:
         )
         hair = self.subject.strands
         strands = None if hair is None else hair.on(vertices)
-        return Figure(self._scene(vertices), lights, world_from_head, strands)
+        return Figure(self._scene(vertices, lights), lights, world_from_head, strands)
 
     def picture(self, camera: Camera, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
         """Draws one picture.
@@ -176,7 +176,7 @@ class Studio:
         finished = developed(out)  # (H, W, 4)
         return finished[..., :3], finished[..., 3]
 
-    def _scene(self, vertices: np.ndarray) -> Scene:
+    def _scene(self, vertices: np.ndarray, lights: Lights) -> Scene:
         subject = self.subject
         gap = lip_gap(subject.landmarks(vertices))
         return Scene(
@@ -189,6 +189,7 @@ class Studio:
             self._paint.channels,
             self._paint.strands,
             self._occlusion(vertices, gap),
+            self._lamps_on_clothes(vertices, lights),
             self._tailored.fields,
             self._tailored.folds(vertices),
             eye_rows(subject, vertices),
@@ -202,6 +203,20 @@ class Studio:
         middle = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
         body = self._sky.visible(vertices - middle)
         return body + self._above * (np.minimum(head, 1.3 * body + 0.2) - body)
+
+    def _lamps_on_clothes(self, vertices: np.ndarray, lights: Lights) -> np.ndarray:
+        """(V, 2) float32 shares of key and rim light that clothes see, by all of a lamp's face.
+
+        A lamp's nearest shade alone, as depth maps are looked up, leaves blots on a broad chest.
+        """
+        if self._sky is None:
+            return np.full((len(vertices), 2), LOOKED_UP, np.float32)
+        middle = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
+        shares = [
+            self._sky.lamp(vertices - middle, lights.directions[i], float(lights.sizes[i]))
+            for i in (KEY, RIM)
+        ]
+        return np.stack(shares, 1)
 
 
 def _left_leg(subject: Subject) -> np.ndarray:

@@ -1,10 +1,14 @@
 """Light of the studio: shadows as wide as lamps make them, surroundings, film."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from ico3d.studio.person.subject import Material
 from ico3d.studio.picture.lamps import STUDIOS, Lamps
 from ico3d.studio.picture.lighting import ambient, lights_on
+from ico3d.studio.picture.occlusion import Sky
 from ico3d.studio.picture.shadows import Covered, cast, seen
 from ico3d.studio.picture.tones import developed, display
 
@@ -49,6 +53,31 @@ def test_a_lit_surface_throws_no_shadow_on_itself(roof):
     for tilt in (0.0, 0.8, -0.8):
         n = np.array([np.sin(tilt), np.cos(tilt), 0.0])
         assert seen(roof, -0.1, 0.003, 0.0, *n) == 1.0
+
+
+def test_vertices_under_a_roof_see_the_part_of_a_lamp_that_its_edge_leaves():
+    at = np.linspace(-0.06, 0.06, 25)
+    floor = np.array([[x, -GAP, z] for x in at for z in (0.0, 0.01)])
+    roof = [[-0.28, 0, -0.2], [0, 0, -0.2], [0, 0, 0.2], [-0.28, 0, 0.2]]
+    vertices = np.concatenate([floor, roof]).astype(np.float32)
+    first = 2 * np.arange(len(at) - 1)[:, None]
+    ground = np.concatenate([first + np.array(corners) for corners in ((0, 1, 2), (1, 3, 2))])
+    count = len(floor)
+    faces = np.concatenate([ground, [[count, count + 2, count + 1], [count, count + 3, count + 2]]])
+    cloth = np.full(len(faces), Material.CLOTH, np.uint8)
+    scene = SimpleNamespace(faces=faces.astype(np.int32), materials=cloth)
+    share = Sky(scene, 512, 0.3, 1).lamp(vertices, DOWN, SIZE)[:count:2]
+    t = np.clip(at / (SIZE * GAP), -1, 1)
+    expected = 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
+    assert np.abs(share - expected).max() < 0.08
+    np.testing.assert_allclose(share[[0, -1]], [0, 1], atol=1e-4)
+
+
+def test_vertices_that_face_away_from_a_lamp_are_not_in_its_shade_twice():
+    vertices = np.array([[0, 0, 0], [0, 0, 0.1], [0.1, 0, 0]], np.float32)
+    down = np.array([[0, 2, 1]], np.int32)
+    scene = SimpleNamespace(faces=down, materials=np.full(1, Material.CLOTH, np.uint8))
+    np.testing.assert_array_equal(Sky(scene, 64, 0.3, 1).lamp(vertices, DOWN, SIZE), 1)
 
 
 def test_surroundings_of_one_colour_light_every_side_alike():

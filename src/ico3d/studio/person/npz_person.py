@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_matrix
 
 from ico3d.common.unpacking.npz import read_npz
 from ico3d.errors import CaptureError
@@ -38,6 +39,10 @@ MATERIAL_BELOW = {
     "socks": Material.SOCK,
 }
 """Materials of garments that only a whole person wears."""
+WORN = (Material.CLOTH, Material.TROUSERS)
+"""What is split once more on a whole person."""
+ARMPIT, SOFTER = 0.13, 40
+"""Metres about a shoulder's joint in which weights of the jumper are smoothed, and how often."""
 LARGEST = 1 << 28
 """Bytes of all arrays as numbers of 64 bits; 53 blendshapes of 27,000 vertices would take 34 MB."""
 MOST_VERTICES = 1 << 19
@@ -78,7 +83,7 @@ FAIR = Look(
     cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
     stripes=False,
     freckles=0.55,
-    jumper=(0.060, 0.120, 0.140),
+    jumper=(0.069, 0.138, 0.161),
     stubble=0.0,
 )
 TANNED = Look(
@@ -110,7 +115,10 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
         _check_sizes(arrays)
         subject = without_covered_neck(_subject(path.stem, arrays, whole))
         coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
-        return smoothed(_with_turning_eyes(subject), np.isin(subject.materials, coarse))
+        subject = smoothed(_with_turning_eyes(subject), np.isin(subject.materials, coarse))
+        subject = _with_soft_armpits(subject) if whole else subject
+        # A sleeve's triangles of 16 mm showed at its outline and at the armpit.
+        return smoothed(subject, np.isin(subject.materials, WORN)) if whole else subject
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:
@@ -252,6 +260,34 @@ def _skeleton(arrays: dict[str, np.ndarray], used: np.ndarray, origin: np.ndarra
         arrays["joint_pos"].astype(float) - origin,
         weights[used] / weights[used].sum(axis=1, keepdims=True),
     )
+
+
+def _with_soft_armpits(subject: Subject) -> Subject:
+    """The person whose jumper bends over a hand's breadth between trunk and arm, without shards."""
+    bones = subject.skeleton
+    if bones is None:
+        return subject
+    knit = subject.faces[subject.materials == Material.CLOTH]
+    a, b = np.unique(np.sort(knit[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0).T
+    count = len(subject.vertices)
+    ones = np.ones(2 * len(a))
+    around = coo_matrix((ones, (np.r_[a, b], np.r_[b, a])), shape=(count, count)).tocsr()
+    worn = np.unique(knit)
+    around = around[worn][:, worn]
+    around = around.multiply(1 / around.sum(1)).tocsr()  # rows: means of neighbours
+    away = np.min(
+        [
+            np.linalg.norm(subject.vertices[worn] - bones.at[bones.index(name)], axis=1)
+            for name in ("upperarm01.L", "upperarm01.R")
+        ],
+        axis=0,
+    )
+    share = np.exp(-((away / ARMPIT) ** 2))[:, None]  # (N, 1)
+    weights = bones.weights.copy()
+    for _ in range(SOFTER):
+        rows = weights[worn]
+        weights[worn] = rows + share * (around @ rows - rows)
+    return replace(subject, skeleton=replace(bones, weights=weights))
 
 
 def _positions_in(used: np.ndarray, indices: np.ndarray) -> np.ndarray:

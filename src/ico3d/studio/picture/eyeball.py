@@ -10,7 +10,7 @@ import numpy as np
 
 from ico3d.splat.cpu.compile import subroutine
 from ico3d.studio.person.subject import Material, Subject
-from ico3d.studio.picture.lighting import KEY, lit, mirrored, seen_lamp
+from ico3d.studio.picture.lighting import KEY, LOOKED_UP, lit, mirrored, seen_lamp
 from ico3d.studio.picture.materials import Spot
 from ico3d.studio.picture.textures import grain, noise, smoothstep
 
@@ -156,7 +156,7 @@ def shaded_eye(colors, e, p, v, smooth, lights, occlusion, pixel):
     shadow *= 1.0 - 0.35 * math.exp(-max(0.0, below) / 0.0012)
     world = _outer(e, nx, ny, nz)
     spot = Spot(white[0], white[1], white[2], 1.0, 0.0, 0.32, 0.0, 0.0)
-    r, g, b = lit(spot, lights, world, v, p, smooth, occlusion * shadow)
+    r, g, b = lit(spot, lights, world, v, p, smooth, occlusion * shadow, LOOKED_UP)
     if on_cornea:
         ir, ig, ib, share = _behind(
             colors, e, (wx, wy, wz), (gx, gy, gz), (dx, dy, dz), rim, lights, pixel

@@ -16,6 +16,8 @@ from ico3d.studio.picture.shadows import Covered, Shadow, cast, seen
 
 KEY, FILL, RIM = 0, 1, 2
 """Rows of the lamps."""
+LOOKED_UP = (-1.0, -1.0)
+"""Shares of key and rim light that are not known and come from the depth maps."""
 OFF = 0.003
 """Metres off the surface at which shadows are looked up: grazing light shades no own triangle."""
 
@@ -186,7 +188,7 @@ def highlight(n_dot_h, n_dot_l, l_dot_h, roughness, facing, size):
 
 
 @subroutine()
-def lit(spot, lights, n, v, p, smooth, occlusion):
+def lit(spot, lights, n, v, p, smooth, occlusion, known):
     """Linear light (3) that a spot sends to the eye.
 
     Args:
@@ -197,6 +199,7 @@ def lit(spot, lights, n, v, p, smooth, occlusion):
         p: Position (3), metres.
         smooth: Unit normal (3) of the mesh, without relief.
         occlusion: Visible share of the sky.
+        known: Shares of key and rim light that the spot sees, or `LOOKED_UP`.
     """
     nx, ny, nz = n
     red, green, blue = ambient(lights, n)
@@ -226,7 +229,10 @@ def lit(spot, lights, n, v, p, smooth, occlusion):
         risen = min(1.0, max(0.0, (level + spot.scatter) / 0.35))
         if risen <= 0.0:
             continue
-        reach = risen * seen_lamp(lights, i, p, smooth, occlusion)
+        if i == FILL or known[0] < 0.0:
+            reach = risen * seen_lamp(lights, i, p, smooth, occlusion)
+        else:
+            reach = risen * known[0 if i == KEY else 1]
         if reach <= 0.0:
             continue
         shine = 0.0

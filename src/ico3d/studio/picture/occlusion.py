@@ -1,15 +1,18 @@
-"""Ambient occlusion: the share of the sky that each vertex sees, from depth maps all around."""
+"""What vertices see of the sky and of wide lamps, from depth maps in many directions."""
 
 import numpy as np
 
 from ico3d.splat.cpu.compile import kernel
 from ico3d.studio.person.subject import CARDS, Subject
-from ico3d.studio.raster import depth_map, vertex_normals
+from ico3d.studio.picture.shadows import vogel_disc
+from ico3d.studio.raster import depth_map, light_basis, vertex_normals
 
 BIAS = 1.4
 """Depth in texels behind a depth map at which a surface still counts as lit."""
 WIDE = 0.05
 """Share of light that reaches the deepest fold."""
+ON_LAMP = 24
+"""Directions in which a lamp is looked for."""
 
 
 class Sky:
@@ -36,16 +39,36 @@ class Sky:
             vertices: (V, 3) float32 metres from the middle of the depth maps; what lies outside of
                 them counts as lit.
         """
+        return WIDE + np.float32(1 - WIDE) * self._share(vertices, self._directions)
+
+    def lamp(self, vertices: np.ndarray, towards: np.ndarray, size: float) -> np.ndarray:
+        """(V,) float32 cosine-weighted part of a distant round lamp that each vertex sees.
+
+        Args:
+            vertices: (V, 3) float32 metres from the middle of the depth maps.
+            towards: (3,) unit vector towards the lamp.
+            size: Tangent of half the angle under which the lamp is seen.
+        """
+        right, down, middle = light_basis(towards)
+        across = size * vogel_disc(ON_LAMP) @ np.stack([right, down])  # (N, 3)
+        directions = middle + across
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return self._share(vertices, directions.astype(np.float32))
+
+    def _share(self, vertices: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(V,) float32 cosine-weighted part of directions (N, 3) in which nothing is met.
+
+        It is 1 for a vertex that faces none of them.
+        """
         normals = vertex_normals(vertices, self._faces)
-        seen = np.zeros(len(vertices), np.float32)
-        total = np.full(len(vertices), 1e-6, np.float32)
+        seen, total = np.full((2, len(vertices)), 1e-6, np.float32)
         bias = BIAS * 2 * self._reach / self._size
-        for direction in self._directions:
+        for direction in directions:
             nearest, screen = depth_map(
                 vertices, self._faces, self._solid, direction, self._size, self._reach
             )
             _add_lit(screen, nearest, bias, normals, direction, seen, total)
-        return WIDE + np.float32(1 - WIDE) * seen / total
+        return seen / total
 
 
 def _sphere(count: int) -> np.ndarray:

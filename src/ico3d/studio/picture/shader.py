@@ -11,7 +11,7 @@ from ico3d.studio.picture import materials as paints
 from ico3d.studio.picture.clothes import garments, knitwear
 from ico3d.studio.picture.clothes.clothed import clothed
 from ico3d.studio.picture.eyeball import shaded_eye
-from ico3d.studio.picture.lighting import lit, seen_lamp
+from ico3d.studio.picture.lighting import LOOKED_UP, lit, seen_lamp
 from ico3d.studio.picture.skin import lit_skin, relieved, skin_at
 from ico3d.studio.picture.textures import noise, strands
 from ico3d.studio.raster import weights_at
@@ -44,6 +44,8 @@ class Scene(NamedTuple):
         channels: (V, 6) float32 `Paint.channels`.
         strands: (V, 4) float32 `Paint.strands`.
         occlusion: (V,) float32 `Paint.occlusion_at` of this frame.
+        lamps: (V, 2) float32 shares of key and rim light that clothes see; below 0 if they are
+            looked up in the depth maps.
         fields: (V, 8) float32 `Tailored.fields`.
         folds: (V,) float32 `Tailored.folds` of this frame.
         eyes: (2, 25) float32 `eye_rows` of this frame.
@@ -58,6 +60,7 @@ class Scene(NamedTuple):
     channels: np.ndarray
     strands: np.ndarray
     occlusion: np.ndarray
+    lamps: np.ndarray
     fields: np.ndarray
     folds: np.ndarray
     eyes: np.ndarray
@@ -178,6 +181,10 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
     smooth = n
     i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
     occlusion = a * scene.occlusion[i] + b * scene.occlusion[j] + c * scene.occlusion[k]
+    known = (
+        a * scene.lamps[i, 0] + b * scene.lamps[j, 0] + c * scene.lamps[k, 0],
+        a * scene.lamps[i, 1] + b * scene.lamps[j, 1] + c * scene.lamps[k, 1],
+    )
     material = scene.materials[f]
     if material == EYE:
         eye = scene.eyes[0 if rest[0] > 0.0 else 1]
@@ -194,7 +201,7 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
         spot = paints.hair(colors, uv[0], uv[1], rest[0], rest[1], rest[2], pixel * per_metre)
         shift = 0.10 * strands(uv[0], uv[1], 260.0, pixel * per_metre)
         white, tinted = _strand_shine(lights, (tx, ty, tz), v, p, n, shift, occlusion)
-        r, g, bl = lit(spot, lights, n, v, p, n, occlusion)
+        r, g, bl = lit(spot, lights, n, v, p, n, occlusion, LOOKED_UP)
         return (
             r + 0.022 * white + 0.9 * tinted * colors.hair[0],
             g + 0.020 * white + 0.9 * tinted * colors.hair[1],
@@ -204,7 +211,7 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
         # A pixel sees more of a surface that turns away: fine relief fades there.
         wide = pixel / max(0.3, n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
         spot, n, valley = clothed(scene, colors, f, a, b, c, rest, n, wide)
-        return lit(spot, lights, n, v, p, smooth, occlusion * valley)
+        return lit(spot, lights, n, v, p, smooth, occlusion * valley, known)
     spot = _spot(scene, colors, f, a, b, c, rest, pixel)
     tilt = spot.bump * min(1.0, max(0.0, 0.0016 / pixel - 1.0))
     if tilt > 0.0:
@@ -216,9 +223,9 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
             n[2] + tilt * (2.0 * noise(q[0], q[1] + 57.0, q[2]) - 1.0),
         )
     if material in (CLOTH, TROUSERS, SHOE, SOCK, SKIRT, FRAME):
-        return lit(spot, lights, n, v, p, smooth, occlusion)
+        return lit(spot, lights, n, v, p, smooth, occlusion, known)
     inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
-    r, g, bl = lit(spot, lights, n, v, p, smooth, (0.35 + 0.65 * occlusion) * inward)
+    r, g, bl = lit(spot, lights, n, v, p, smooth, (0.35 + 0.65 * occlusion) * inward, LOOKED_UP)
     # Deep in the mouth, light has been red-tinted by lips and cheeks.
     return r * (0.25 + 0.75 * inward), g * inward**1.4, bl * inward**1.6
 
