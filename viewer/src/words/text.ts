@@ -90,5 +90,9 @@ function valueOf(value: Values[string] | undefined, language: Language): string 
 
 function oneOf(value: One, language: Language): string {
   if (typeof value === 'string' || !('tongue' in value)) return textOf(value, language);
-  return new Intl.DisplayNames(language, { type: 'language' }).of(value.tongue) ?? value.tongue;
+  try {
+    return new Intl.DisplayNames(language, { type: 'language' }).of(value.tongue) ?? value.tongue;
+  } catch {
+    return value.tongue; // a persona's code that is none of BCP 47
+  }
 }

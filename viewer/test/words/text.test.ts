@@ -76,6 +76,7 @@ describe('a sentence', () => {
   test('names a language in the language of the sentence', () => {
     expect(textOf(say('ask.in', { language: { tongue: 'en' } }), 'de')).toBe('Auf Englisch fragen');
     expect(textOf(say('ask.in', { language: { tongue: 'de' } }), 'ja')).toBe('ドイツ語で質問');
+    expect(textOf(say('ask.in', { language: { tongue: 'sr-RS-Latn' } }), 'de')).toBe('Auf sr-RS-Latn fragen'); // no code
     const languages = [{ tongue: 'en' }, { tongue: 'de' }];
     expect(textOf(say('start.speaks', { name: 'Iris', languages }), 'es')).toBe('Iris entiende y habla inglés y alemán.');
   });

@@ -16,7 +16,7 @@ from pipecat.frames.frames import TTSAudioRawFrame
 from ico3d.chat.services.voice import openai, openai_service
 from ico3d.chat.serving import server
 from ico3d.chat.wire.protocol import SPEECH_RATE
-from ico3d.errors import SettingsError
+from ico3d.errors import ServiceError, SettingsError
 
 TONE = 0.1  # radians per sample
 PIECES = 5
@@ -240,6 +240,23 @@ async def test_a_header_that_claims_what_is_no_speech_is_an_error(
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert not len(heard) and reason in errors[0] and peak < 30_000_000
+
+
+@pytest.mark.parametrize(
+    ("before", "form", "reason"),
+    [(b"", b"LIES", "no plain WAV header"), (bytes(64), b"WAVE", "claims 10 samples per second")],
+)
+async def test_a_header_is_read_wherever_the_pipeline_would(before, form, reason):
+    header = bytearray(as_wav(tone(2400), 24_000))
+    struct.pack_into("<4s12xI", header, 8, form, 10)
+
+    async def pieces():
+        if before:
+            yield before
+        yield bytes(header)
+
+    with pytest.raises(ServiceError, match=reason):
+        [piece async for piece in openai_service.judged(pieces(), SPEECH_RATE)]
 
 
 async def test_a_voice_that_does_not_end_is_ended(speech, say, monkeypatch):

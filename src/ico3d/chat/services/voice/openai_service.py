@@ -76,12 +76,17 @@ async def judged(sound: AsyncIterator[bytes], rate: int) -> AsyncIterator[bytes]
         rate: Samples per second, unless a header says otherwise.
 
     Raises:
-        ServiceError: If a header claims more than is accepted, or the sound does not end in time.
+        ServiceError: If a header claims more than is accepted or cannot be read, or the sound does
+            not end in time.
     """
-    claim, frames, first = Claim(rate, width=2), 0, True
+    claim, frames, headed = Claim(rate, width=2), 0, False
     async for piece in sound:
-        if first:
-            claim, first = wav_claim(piece) or claim, False
+        # The pipeline takes the first piece that begins so for a header, wherever it comes.
+        if not headed and piece.startswith(b"RIFF"):
+            headed, told = True, wav_claim(piece)
+            if told is None:
+                raise ServiceError("its sound has no plain WAV header")
+            claim = told
         frames += len(piece) // 2
         wrong = fault(replace(claim, frames=frames), REQUEST)
         if not wrong and (claim.channels, claim.width) != (1, 2):
