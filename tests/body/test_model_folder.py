@@ -162,6 +162,7 @@ FALSE = {
     "a sphere too few": ("skinned", "caster_weights", lambda tensor: tensor[1:].contiguous()),
     "not a number": ("skinned", "skin_logits", lambda tensor: tensor * torch.nan),
     "wide numbers": ("deformed", "means", torch.Tensor.double),
+    "places out of this world": ("skinned", "means", lambda tensor: tensor + 1e30),
     "a shallow plane": ("deformed", "grid.xy0", with_column_missing),
 } | {
     f"a narrow {name}": (kind, name, with_column_missing)

@@ -144,6 +144,17 @@ def test_a_file_of_something_else_is_one_sentence(tmp_path):
         HeadModel.load(tmp_path / "x.safetensors")
 
 
+@pytest.mark.parametrize("value", [1e30, -1e30, float("nan")])
+def test_places_out_of_this_world_are_refused(tmp_path, value):
+    file = tmp_path / "model.safetensors"
+    HeadModel(head_shape(2, features=4, hidden=3, frequencies=1), 3).save(file)
+    tensors, state = load_tensors(file)
+    tensors["means"][1, 2] = value
+    save_tensors(file, tensors, state)
+    with pytest.raises(ModelError, match=r"does not hold a head model: .*more than 10,000 m"):
+        HeadModel.load(file)
+
+
 @pytest.mark.parametrize(
     ("field", "value", "named"),
     [

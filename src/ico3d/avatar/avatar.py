@@ -14,7 +14,7 @@ from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
-from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
+from ico3d.training.checkpoint import DAMAGED, FARTHEST, load_tensors, save_tensors
 
 ABOUT = "avatar.json"
 """Name of the file that marks a folder as an avatar's."""
@@ -222,7 +222,10 @@ def load_placement(file: Path) -> tuple[Placement, np.ndarray]:
     count, size = [*values["expressions"].shape, 0, 0][:2]
     expected = ((4, 4), (count, 4, 4), (count, size))
     for name, shape in zip(names, expected, strict=True):
-        if values[name].shape != shape or not np.isfinite(values[name]).all():
-            raise ModelError(f"{file}: '{name}' must be finite and have the shape {shape}.")
+        if values[name].shape != shape or not (np.abs(values[name]) <= FARTHEST).all():
+            raise ModelError(
+                f"{file}: '{name}' must be finite and have the shape {shape}, and nothing in it may "
+                f"be beyond {FARTHEST:,.0f}."
+            )
     poses = Placement(values["canonical_from_head"], values["world_from_canonical"])
     return poses, values["expressions"]

@@ -10,7 +10,7 @@ from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.rig.rig import Rig
 from ico3d.splat import harmonics
-from ico3d.training.checkpoint import Size, check_tensor
+from ico3d.training.checkpoint import Size, check_places, check_tensor
 
 CANONICAL_ROWS: dict[str, Size] = {
     "means": (3,),
@@ -39,6 +39,7 @@ def check_window(model: WindowModel) -> None:
     limits = _limits(motion)
     for name, tensor in {**model.gaussians, **model.shared}.items():
         check_tensor(name, tensor, sizes[name], limits.get(name))
+    check_places(model.gaussians["means"])
     if model.camera_colors is not None:
         check_tensor("camera_colors", model.camera_colors, (None, *COLOR_MAP))
     if isinstance(motion, Skinned):

@@ -16,7 +16,13 @@ from ico3d.head.blending.basis import blend
 from ico3d.head.portrait.neck import Neck
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
-from ico3d.training.checkpoint import DAMAGED, check_shapes, load_tensors, save_tensors
+from ico3d.training.checkpoint import (
+    DAMAGED,
+    check_places,
+    check_shapes,
+    load_tensors,
+    save_tensors,
+)
 
 Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
@@ -299,6 +305,7 @@ class HeadModel(nn.Module):
                 )
             shape, count = HeadShape(**fields), tensors["means"].shape[0]
             check_shapes(lambda: cls(shape, count), tensors)
+            check_places(tensors["means"])
             model = cls(shape, count)
             model.load_state_dict(tensors)
         except (SettingsError, *DAMAGED) as error:

@@ -51,6 +51,8 @@ _SEALED = f'{{"__metadata__":{{"{SEAL}":"'.encode()
 """How the header of a sealed file begins, behind its length in eight bytes."""
 _UNSEALED = b'{"__metadata__":{"state"'
 """How that of a file without a hash begins."""
+FARTHEST = 1e4
+"""Largest distance of a position from the origin, metres: squares of it stay numbers."""
 _NO_SEAL = b"0" * 64
 _CHUNK = 1 << 20
 _COPIES = 4
@@ -208,6 +210,19 @@ def check_shapes(build: Callable[[], nn.Module], tensors: Mapping[str, Tensor]) 
             raise ValueError(
                 f"'{name}' has the shape {found.get(name)}, expected {wanted.get(name)}"
             )
+
+
+def check_places(places: Tensor) -> None:
+    """Checks positions of a file: farther out, what is computed of them is no number any more.
+
+    Args:
+        places: (N, 3) metres.
+
+    Raises:
+        ValueError: If one lies more than `FARTHEST` metres from the origin.
+    """
+    if not (places.abs() <= FARTHEST).all():  # also where one is NaN
+        raise ValueError(f"'means' lie more than {FARTHEST:,.0f} m from the origin")
 
 
 def check_tensor(name: str, tensor: Tensor, size: Size, below: int | None = None) -> None:

@@ -140,6 +140,7 @@ def test_damaged_folders_are_refused(avatar, damage, sentence):
     "name, value",
     [
         ("canonical_from_head", np.eye(3)),
+        ("canonical_from_head", 1e30 * np.eye(4)),
         ("world_from_canonical", poses()[:, :3]),
         ("world_from_canonical", poses() * np.nan),
         ("expressions", np.zeros(FRAMES, np.float32)),
@@ -148,7 +149,7 @@ def test_damaged_folders_are_refused(avatar, damage, sentence):
     ],
 )
 def test_damaged_placements_are_refused(avatar, name, value):
-    """Of other shapes, or not finite."""
+    """Of other shapes, not finite, or out of this world."""
     _, folder = avatar
     tensors, _ = load_tensors(folder / PLACEMENT)
     save_tensors(folder / PLACEMENT, tensors | {name: torch.from_numpy(np.array(value))}, {})
