@@ -224,7 +224,7 @@ def load_placement(file: Path) -> tuple[Placement, np.ndarray]:
     for name, shape in zip(names, expected, strict=True):
         if values[name].shape != shape or not (np.abs(values[name]) <= FARTHEST).all():
             raise ModelError(
-                f"{file}: '{name}' must be finite and have the shape {shape}, and nothing in it may "
+                f"{file}: '{name}' must be finite and have the shape {shape}; nothing in it may "
                 f"be beyond {FARTHEST:,.0f}."
             )
     poses = Placement(values["canonical_from_head"], values["world_from_canonical"])
