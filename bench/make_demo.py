@@ -83,8 +83,8 @@ TRAIN_HEAD = (
     "--density.gradient 0.00018 --density.min-contribution 0.15"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 100 --initial.gaussians 36000 --density.max-gaussians 62000 "
-    "--density.until 0.6 --joining.no-match-colors"
+    "--steps-per-frame 150 --initial.gaussians 46000 --density.max-gaussians 80000 "
+    "--density.until 0.6 --loss.squares 2 --joining.no-match-colors"
 )
 
 
