@@ -118,11 +118,11 @@ def test_bundles_hold_what_a_persona_says_and_old_ones_stay_readable(packed):
     assert set(value["persona"]) == {"name", "greeting", "notes"}, "as programs before wrote it"
     assert Manifest.from_json(packed).to_json() == packed
     value["persona"] |= {"manner": "Warm.", "voice": {"kokoro": "af_heart"}}
-    value["persona"]["languages"] = ["sr-Latn-RS", "es-419", "de-CH-1996", "sl-rozaj"]
+    value["persona"]["languages"] = ["sr-Latn-RS", "es-419", "de-CH-1996", "sl-rozaj", "zh-yue-HK"]
     manifest = Manifest.from_json(json.dumps(value).encode())
     assert manifest.persona.manner == "Warm." and manifest.persona.forbidden == ()
     assert json.loads(manifest.to_json())["persona"] == value["persona"]
-    odd = [("languages", [code]) for code in ("Klingon", "sr-RS-Latn", "en-", "x-private")]
+    odd = [("languages", [code]) for code in ("Klingon", "sr-RS-Latn", "en-", "x-private", "en-1")]
     for key, entry in [*odd, ("forbidden", ["|"]), ("mood", "happy")]:
         wrong = value | {"persona": value["persona"] | {key: entry}}
         with pytest.raises(BundleError, match=r"manifest\.json"):

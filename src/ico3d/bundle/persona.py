@@ -12,7 +12,7 @@ from ico3d.common.typed import Rules, fill, parse_json, parse_toml, plain
 from ico3d.errors import BundleError
 
 LANGUAGE = re.compile(
-    r"[a-z]{2,3}(-[A-Za-z]{4})?(-([A-Za-z]{2}|[0-9]{3}))?(-([A-Za-z0-9]{5,8}|[0-9][A-Za-z0-9]{3}))*"
+    r"[a-z]{2,3}(-[A-Za-z]{3}){0,3}(-[A-Za-z]{4})?(-([A-Za-z]{2}|[0-9]{3}))?(-([A-Za-z0-9]{5,8}|[0-9][A-Za-z0-9]{3}))*"
 )
 VOICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*(\+[A-Za-z0-9_-]+)?")
 MOST_LETTERS = 4000  # of a text

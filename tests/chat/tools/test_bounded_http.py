@@ -2,11 +2,14 @@
 
 import asyncio
 import gzip
+import json
+import time
 
 import pytest
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import JSONResponse
 
+from ico3d.chat.services.bounded import Limits
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools.mcp import Connection
 from support.chat.scripted_server import running
@@ -19,13 +22,20 @@ async def test_answers_are_short_and_plain(monkeypatch):
     from ico3d.chat.services.bounded import EVENTS
     from ico3d.chat.tools import bounded_http
 
-    monkeypatch.setattr(bounded_http, "MOST_BYTES", 1000)
+    monkeypatch.setattr(bounded_http, "MESSAGE", Limits(1000, 10))
     app, accepted = FastAPI(), []
 
     @app.get("/{size}")
     async def answer(size: int, request: Request, kind: str = "application/json") -> Response:
         accepted.append(request.headers["accept-encoding"])
-        return Response(b" " * size, media_type=kind)
+        return Response(
+            (b" " * 499 + b"\n\n") * (size // 501) + b" " * (size % 501), media_type=kind
+        )
+
+    @app.get("/parts/{number}")
+    async def parts(number: int, request: Request, kind: str = "application/json") -> Response:
+        accepted.append(request.headers["accept-encoding"])
+        return Response(b"{}," * number, media_type=kind)
 
     @app.post("/")
     async def packed() -> Response:
@@ -36,11 +46,15 @@ async def test_answers_are_short_and_plain(monkeypatch):
         url = f"http://127.0.0.1:{port}"
         assert len((await client.get(f"{url}/1000")).content) == 1000
         assert len((await client.get(f"{url}/2000?kind={EVENTS}")).content) == 2000
-        with pytest.raises(httpx2.ReadError, match="more than 1000 bytes"):
+        with pytest.raises(httpx2.ReadError, match="too large"):
             await client.get(f"{url}/1001")
+        for kind in ("application/json", EVENTS):
+            assert (await client.get(f"{url}/parts/5?kind={kind}")).content == b"{}," * 5
+            with pytest.raises(httpx2.ReadError, match="too large"):
+                await client.get(f"{url}/parts/6?kind={kind}")
         with pytest.raises(httpx2.ReadError, match="compressed"):
             await client.post(url)
-    assert accepted == ["identity"] * 3
+    assert accepted == ["identity"] * 7
 
 
 @pytest.fixture
@@ -166,4 +180,75 @@ async def test_streams_are_not_opened_again_without_a_pause(monkeypatch, is_resu
         before = len(methods)
         assert "error" in await connection.call("t", {})  # at once, whatever waits
         assert "tools/call" in methods[before:]
+        await connection.close()
+
+
+@pytest.mark.real_time
+async def test_a_server_that_does_not_let_go_keeps_nobody(monkeypatch):
+    """Visits left connections behind, the server no longer ended, and a call had no end."""
+    from ico3d.chat.tools import bounded_http
+
+    monkeypatch.setattr(bounded_http, "ENDING", 0.3)
+    app, methods = _hasty(is_resumed=False)
+    held = asyncio.Event()
+
+    @app.delete("/mcp")
+    async def end() -> Response:
+        methods.append("DELETE")
+        await held.wait()
+        return Response()
+
+    async with running(app) as port:
+        connection = Connection(McpServer("m", url=f"http://127.0.0.1:{port}/mcp", seconds=2))
+        assert [one.name for one in await connection.functions()] == ["m_t"]
+        async with asyncio.timeout(3):
+            await connection.close()
+        held.set()
+    assert methods.count("DELETE") == 1
+
+
+@pytest.mark.real_time
+async def test_a_lost_call_ends_though_its_session_does_not(monkeypatch):
+    from ico3d.chat.tools import bounded_http
+
+    monkeypatch.setattr(bounded_http, "ENDING", 0.3)
+    app, _ = _hasty(is_resumed=False)
+    held, lost = asyncio.Event(), False
+
+    @app.middleware("http")
+    async def lose(request: Request, go_on):
+        if lost and request.method == "POST":
+            return Response(status_code=404)
+        if request.method == "DELETE":
+            await held.wait()
+        return await go_on(request)
+
+    async with running(app) as port:
+        connection = Connection(McpServer("m", url=f"http://127.0.0.1:{port}/mcp", seconds=2))
+        await connection.functions()
+        lost = True
+        async with asyncio.timeout(4):
+            assert "t failed" in (await connection.call("t", {}))["error"]
+        held.set()
+
+
+@pytest.mark.real_time
+async def test_an_answer_of_nothing_but_faults_is_refused_before_they_are_told():
+    """Of 300 kB the SDK made errors for 5 s, and 1.9 GB of them."""
+    app, _ = _hasty(is_resumed=False)
+    faults = b'{"jsonrpc":"2.0","id":%d,"result":{"content":[' + b"{}," * 100_000 + b"{}]}}"
+
+    @app.middleware("http")
+    async def fault(request: Request, go_on):
+        body = await request.body()
+        if b"tools/call" not in body:
+            return await go_on(request)
+        return Response(faults % json.loads(body)["id"], media_type="application/json")
+
+    async with running(app) as port:
+        connection = Connection(McpServer("m", url=f"http://127.0.0.1:{port}/mcp", seconds=5))
+        await connection.functions()
+        begun = time.process_time()
+        assert "t failed" in (await connection.call("t", {}))["error"]
+        assert time.process_time() - begun < 1.0
         await connection.close()

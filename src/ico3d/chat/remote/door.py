@@ -17,7 +17,7 @@ SILENCE = 10.0
 
 So is an answer of which nothing is read for as long.
 """
-PACE = 20_000
+PACE = 8_000
 """Bytes per second, beyond the first seconds, at which a request has to come: it holds a place."""
 BROKEN, BUSY = 1008, 1013  # WebSocket close codes
 

@@ -6,11 +6,24 @@ from collections.abc import AsyncIterator
 
 import httpx2
 
-from ico3d.chat.services.bounded import Wrapped, ask_plain, ensure_plain, is_events
+from ico3d.chat.services.bounded import (
+    Events,
+    Limits,
+    Whole,
+    Wrapped,
+    ask_plain,
+    ensure_plain,
+    is_events,
+)
 from ico3d.chat.supervision.allowance import Bucket
 
-MOST_BYTES = 4 << 20
-"""Of an answer, which may be the list of all functions."""
+MESSAGE = Limits(1 << 20, 16_000)
+"""Bytes and parts of an answer, which may be the list of all functions.
+
+Of each part that does not fit the protocol the SDK makes several errors, of 20 kB in all.
+"""
+ENDING = 2.0
+"""Seconds in which a server may answer that a session ends."""
 LINE_RATE, LINES_AT_ONCE = 200.0, 4000.0
 """Lines of a server's events per second for long, and at once: each costs the loop of all visitors
 time. An event has three or four."""
@@ -20,10 +33,11 @@ server says so (`retry: 0`), it does that again without a pause."""
 
 
 class BoundedTransport(httpx2.AsyncHTTPTransport):
-    """Reads no more of an answer than `MOST_BYTES`, and none that is compressed.
+    """Reads no more of an answer than `MESSAGE`, and none that is compressed.
 
-    A stream of events may go on for long: the SDK bounds each of them, and this their number. What
-    opens streams anew waits if that is too soon; calls, which are sent by POST, do not.
+    A stream of events may go on for long: each is a message, and no more than `LINE_RATE` come.
+    What opens streams anew waits if that is too soon; calls, which are sent by POST, do not. What
+    ends a session is answered within `ENDING`, or not at all.
     """
 
     def __init__(self, trust_env: bool = True):
@@ -43,24 +57,26 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
         if request.method == "GET":
             while not self._streams.take(1):
                 await asyncio.sleep(1 / STREAM_RATE)
+        if request.method == "DELETE":
+            return await self._ended(request)
         response = await super().handle_async_request(request)
         await ensure_plain(response)
-        paced = is_events(response)
         stream = response.stream
-        response.stream = _Paced(stream, self._lines) if paced else _Bounded(stream)
+        if is_events(response):
+            response.stream = _Paced(stream, self._lines)
+        else:
+            response.stream = Whole(stream, MESSAGE)
         return response
 
-
-class _Bounded(Wrapped):
-    """The bytes of an answer, up to `MOST_BYTES`."""
-
-    async def __aiter__(self) -> AsyncIterator[bytes]:
-        size = 0
-        async for piece in self._stream:
-            size += len(piece)
-            if size > MOST_BYTES:
-                raise httpx2.ReadError(f"its answer has more than {MOST_BYTES} bytes")
-            yield piece
+    async def _ended(self, request: httpx2.Request) -> httpx2.Response:
+        """The answer to the end of a session, of which nobody wants more than its status."""
+        try:
+            async with asyncio.timeout(ENDING):
+                response = await super().handle_async_request(request)
+                await response.aclose()
+        except TimeoutError as error:
+            raise httpx2.ReadTimeout("it does not answer that a session ends") from error
+        return httpx2.Response(response.status_code, request=request)
 
 
 class _Paced(Wrapped):
@@ -71,8 +87,9 @@ class _Paced(Wrapped):
         self._lines = lines
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
-        last = b""
+        last, events = b"", Events(MESSAGE)
         async for piece in self._stream:
+            events.add(piece)
             if not self._lines.take(_ends(last + piece) - _ends(last)):
                 raise httpx2.ReadError("it sends too many events")
             last = piece[-1:]

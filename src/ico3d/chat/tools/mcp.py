@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 LONGEST_NAME = 64  # that models accept for a function
 LONGEST_COMPLAINT = 200
+LONGEST_END = 4.0  # s in which a connection ends, and again after it was given up
 MOST_FUNCTIONS = 64  # of a server: all their descriptions are part of every question
 
 Offer = Callable[[list[FunctionSchema]], None]
@@ -124,7 +125,12 @@ class Connection:
             line.closing.set()
             if not line.opened.done():
                 line.task.cancel()
-            await asyncio.gather(line.task, return_exceptions=True)
+            await asyncio.wait([line.task], timeout=LONGEST_END)
+            if not line.task.done():
+                line.task.cancel()
+                await asyncio.wait([line.task], timeout=LONGEST_END)
+            if not line.task.done():
+                logger.warning(f"{self.server.where} does not let go of its connection.")
 
     def told(self, error: BaseException) -> str:
         """What went wrong, in part of a sentence without keys."""

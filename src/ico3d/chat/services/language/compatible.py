@@ -25,8 +25,8 @@ from ico3d.chat.wire.characters import sendable, sendable_json
 
 MOST_ROUNDS = 4
 """How often a model may call functions in one turn before it must answer in words."""
-MOST_ARGUMENTS = 64 << 10
-"""Letters of the arguments of an answer's functions."""
+MOST_OF_CALLS = 64 << 10
+"""Letters of the names, numbers and arguments of an answer's functions."""
 MOST_CALLS = 8
 """Functions that one answer may call: a visitor can talk a model into asking for many."""
 COMPLETE = ("stop", "tool_calls", "function_call")
@@ -137,9 +137,9 @@ class CompatibleModel(OpenAILLMService):
             async for chunk in chunks:
                 for choice in chunk.choices or []:
                     end = choice.finish_reason or end
-                    letters += _letters_of_arguments(choice.delta)
-                    if letters > MOST_ARGUMENTS:
-                        raise httpx2.ReadError("the arguments of its functions are too long")
+                    letters += _letters_of_calls(choice.delta)
+                    if letters > MOST_OF_CALLS:
+                        raise httpx2.ReadError("its calls of functions are too long")
                     await self._take_apart(choice.delta, thoughts)
                 yield chunk
         if end == "length" and opens and not thoughts.begun:
@@ -219,10 +219,12 @@ async def _closing(
         await stream.close()
 
 
-def _letters_of_arguments(delta: ChoiceDelta | None) -> int:
-    """Letters of the arguments of functions in a piece of an answer."""
+def _letters_of_calls(delta: ChoiceDelta | None) -> int:
+    """Letters of calls of functions in a piece of an answer: all of it goes back to the server."""
     calls = (delta.tool_calls if delta else None) or []
-    return sum(len(call.function.arguments or "") for call in calls if call.function)
+    named = [call.function.name or "" for call in calls if call.function]
+    given = [call.function.arguments or "" for call in calls if call.function]
+    return sum(map(len, [*named, *given, *(call.id or "" for call in calls)]))
 
 
 def rounds(messages: list[dict[str, Any]]) -> int:

@@ -91,12 +91,12 @@ class Thoughts:
     def push(self, text: str) -> Parts:
         """Adds text; returns the parts that are now known."""
         text = self._rest + text
-        parts, at = Parts(), 0
+        said, thought, at = list[str](), list[str](), 0
         for mark in _MARK.finditer(text):
-            parts += self._take(text[at : mark.start()])
+            _add(self._take(text[at : mark.start()]), said, thought)
             at = mark.end()
             if self.begun and not self._depth and _WORDS.match(mark[0]):
-                parts += self._take(mark[0])
+                _add(self._take(mark[0]), said, thought)
             elif mark["open"]:
                 self._open()
             elif self._depth:
@@ -104,11 +104,13 @@ class Thoughts:
                 self._after = ""
                 self._closed = self._closed or mark["close"] is not None
             elif mark["close"]:
-                parts = Parts("", parts.thought + self._held + parts.said)
+                thought += [self._held, *said]
+                said.clear()
                 self._held, self.opened, self.lone = "", False, True
         cut = at + _whole(text[at:])
         self._rest = text[cut:]
-        return parts + self._take(text[at:cut])
+        _add(self._take(text[at:cut]), said, thought)
+        return Parts("".join(said), "".join(thought))
 
     def separate(self) -> Parts:
         """Notes that the server separates thoughts itself, so its text is the answer."""
@@ -153,6 +155,12 @@ class Thoughts:
         text = text if self.begun else text.lstrip()
         self.begun = self.begun or bool(text)
         return text
+
+
+def _add(parts: Parts, said: list[str], thought: list[str]) -> None:
+    """Adds parts to lists, which are joined once: a text of marks alone has thousands."""
+    said.append(parts.said)
+    thought.append(parts.thought)
 
 
 def without_thoughts(text: str, opened: bool | None = None) -> str:
