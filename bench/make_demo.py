@@ -13,17 +13,24 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import tyro
 
+from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.embodying.builds.change import change_to
-from ico3d.bundle.format import Bundle
+from ico3d.avatar.render_bundle import BakedAvatar
+from ico3d.avatar.staging import thumbnail
+from ico3d.bundle.format import THUMBNAIL, Bundle, coarse_first, write_bundle
+from ico3d.bundle.head import HEAD as HEAD_FILE
 from ico3d.bundle.head import HEAD_REST
 from ico3d.bundle.packaged import FILE
-from ico3d.bundle.skinned.info import SKINNED_REST
+from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.gestures import gesture_files
+from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
+from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.cli import run_script
 from ico3d.motion.recorded.cut import CUTS, to_toml
 from ico3d.rig.rig import Rig
@@ -43,6 +50,11 @@ LIGHT = "soft"
 SLENDER = 0.8
 """How far the subject's body is on the way to MakeHuman's slender build: the files' shoulders and
 sleeves are broad for their heads."""
+SHOULDERS, ARM = 0.02, "shoulder01"
+"""Metres by which each arm is moved inwards once she is baked, since builds leave the skeleton as
+it is, and the joints that begin an arm."""
+HANGING = 0.96
+"""Width of the trunk beside which arms hang, as a multiple of the recorded one."""
 TRIED = 2
 """Cameras whose pictures are timed before recording."""
 
@@ -83,7 +95,7 @@ TRAIN_HEAD = (
     "--density.gradient 0.00018 --density.min-contribution 0.15"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 150 --initial.gaussians 46000 --density.max-gaussians 80000 "
+    "--steps-per-frame 100 --initial.gaussians 46000 --density.max-gaussians 80000 "
     "--density.until 0.6 --loss.squares 2 --joining.no-match-colors"
 )
 
@@ -142,6 +154,7 @@ class Demo:
         files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
         notices = ("--licences", *self.licences, "--made-by", MAKER)
         ico3d("bake", *files, "--strip", work / "strip.png", *notices)
+        write_narrower(self.out)
         ico3d("render", self.out, work / "gestures.mp4", "--gestures", *GESTURES)
         check(self.out)
 
@@ -181,6 +194,52 @@ def slenderer(person: dict[str, np.ndarray], share: float) -> dict[str, np.ndarr
     rig = Rig(tuple(map(str, names)), tuple(map(int, parents)), places)
     moves, _ = change_to("slender", rig).at(person["verts"].astype(np.float64))
     return person | {"verts": (person["verts"] + share * moves).astype(np.float32)}
+
+
+def write_narrower(path: Path) -> None:
+    """Moves the arms of a bundle's body inwards; gestures go with them."""
+    bundle = Bundle.open(path)
+    head, poses = bundle.require_head()
+    assert bundle.skinned is not None and bundle.manifest.head is not None
+    body = narrower(bundle.skinned)
+    old = (HEAD_REST, SKINNED_REST)
+    files = {name: bundle.read(name) for name in bundle.manifest.files if name not in old}
+    files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()}
+    files |= gesture_files(body, (), HANGING)
+    person = BakedAvatar(head, SkinnedBody(body), poses)
+    first = person.gaussians(0.0, bundle.manifest.head.idle_expression)
+    files[THUMBNAIL] = thumbnail(first, bundle.manifest.camera, bundle.manifest.background)
+    info = replace(bundle.manifest.head, num_rest=0)
+    manifest = replace(bundle.manifest, head=info, skinned=replace(body.info, num_rest=0))
+    write_bundle(path, *coarse_first(manifest, files))
+
+
+def narrower(body: BakedSkinned) -> BakedSkinned:
+    """The body with its arms `SHOULDERS` nearer to the middle; what hangs on both goes part way."""
+    rig, lamp = body.rig, body.lamp
+    assert lamp is not None  # it is recorded in the light of one
+    moves = np.zeros((len(rig), 3))
+    for joint, parent in enumerate(rig.parents):
+        if rig.names[joint].startswith(ARM):
+            moves[joint, 0] = -SHOULDERS * np.sign(rig.joints[joint, 0])
+        elif parent >= 0:
+            moves[joint] = moves[parent]
+    points = lamp.caster_points * POINT_UNIT + _carried(
+        moves, lamp.caster_joints, lamp.caster_weights
+    )
+    casters = np.rint(points / POINT_UNIT).astype(np.int16)
+    return replace(
+        body,
+        means=(body.means + _carried(moves, body.joints, body.weights)).astype(np.float32),
+        rig_joints=(body.rig_joints + moves).astype(np.float32),
+        lamp=replace(lamp, caster_points=casters),
+    )
+
+
+def _carried(moves: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(N, 3) how far points go that hang on joints (N, 4) which move (J, 3)."""
+    share = weights / weights.sum(1, keepdims=True)  # (N, 4)
+    return np.einsum("nk,nkd->nd", share, moves[joints])
 
 
 def _seconds_of_a_picture(subject: Path, rig: str, shot: Shot) -> float:
