@@ -15,6 +15,7 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
@@ -137,7 +138,8 @@ class Demo:
         person = work / self.subject.name
         if not person.exists():
             work.mkdir(parents=True, exist_ok=True)
-            np.savez_compressed(person, **slenderer(dict(np.load(self.subject)), SLENDER))
+            arrays: dict[str, Any] = slenderer(dict(np.load(self.subject)), SLENDER)
+            np.savez_compressed(person, **arrays)
         # moods and glances are nothing that a voice could drive
         self._record(person, work / "head-capture", "head", self.head_shot)
         body = (work / "body-capture", "body", self.body_shot)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import csr_array
 
 from ico3d.common.unpacking.npz import read_npz
 from ico3d.errors import CaptureError
@@ -268,13 +268,12 @@ def _with_soft_armpits(subject: Subject) -> Subject:
     if bones is None:
         return subject
     knit = subject.faces[subject.materials == Material.CLOTH]
-    a, b = np.unique(np.sort(knit[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0).T
-    count = len(subject.vertices)
-    ones = np.ones(2 * len(a))
-    around = coo_matrix((ones, (np.r_[a, b], np.r_[b, a])), shape=(count, count)).tocsr()
     worn = np.unique(knit)
-    around = around[worn][:, worn]
-    around = around.multiply(1 / around.sum(1)).tocsr()  # rows: means of neighbours
+    edges = np.searchsorted(worn, knit[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
+    a, b = np.unique(np.sort(edges, axis=1), axis=0).T
+    rows, columns = np.r_[a, b], np.r_[b, a]
+    share_of = 1 / np.bincount(rows, minlength=len(worn))
+    around = csr_array((share_of[rows], (rows, columns)), shape=(len(worn), len(worn)))
     away = np.min(
         [
             np.linalg.norm(subject.vertices[worn] - bones.at[bones.index(name)], axis=1)
@@ -285,8 +284,8 @@ def _with_soft_armpits(subject: Subject) -> Subject:
     share = np.exp(-((away / ARMPIT) ** 2))[:, None]  # (N, 1)
     weights = bones.weights.copy()
     for _ in range(SOFTER):
-        rows = weights[worn]
-        weights[worn] = rows + share * (around @ rows - rows)
+        own = weights[worn]
+        weights[worn] = own + share * (around @ own - own)  # towards the mean of the neighbours
     return replace(subject, skeleton=replace(bones, weights=weights))
 
 
