@@ -12,6 +12,7 @@ from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat import harmonics
+from ico3d.training import checkpoint
 from ico3d.training.checkpoint import load_tensors, save_tensors
 from support.heads.shapes import head_shape
 
@@ -142,6 +143,16 @@ def test_a_file_of_something_else_is_one_sentence(tmp_path):
     save_tensors(tmp_path / "x.safetensors", {"a": torch.zeros(1)}, {"shape": {"nonsense": 1}})
     with pytest.raises(ModelError, match="does not hold a head model"):
         HeadModel.load(tmp_path / "x.safetensors")
+
+
+def test_layers_of_more_values_than_are_drawn_are_refused(tmp_path, monkeypatch):
+    """1.3 MB on the disk took 4.1 GB to draw: 8,192 octaves of each Gaussian's place."""
+    file = tmp_path / "model.safetensors"
+    HeadModel(head_shape(2, features=4, hidden=3, frequencies=100), 5).save(file)
+    assert len(HeadModel.load(file)) == 5
+    monkeypatch.setattr(checkpoint, "MOST_VALUES", 5 * 600)
+    with pytest.raises(ModelError, match="layers of 607 values of 5 Gaussians are too large"):
+        HeadModel.load(file)
 
 
 @pytest.mark.parametrize("value", [1e30, -1e30, float("nan")])

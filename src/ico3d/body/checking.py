@@ -10,7 +10,7 @@ from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.rig.rig import Rig
 from ico3d.splat import harmonics
-from ico3d.training.checkpoint import Size, check_places, check_tensor
+from ico3d.training.checkpoint import Size, check_places, check_tensor, check_width
 
 CANONICAL_ROWS: dict[str, Size] = {
     "means": (3,),
@@ -46,6 +46,7 @@ def check_window(model: WindowModel) -> None:
         _check_skeleton(motion, model)
     if isinstance(motion, Deformation):
         _check_box(motion)
+        check_width(count, motion.mlp.inputs, motion.mlp.width)
 
 
 def harmonics_of(model: WindowModel) -> int:

@@ -20,6 +20,7 @@ from ico3d.training.checkpoint import (
     DAMAGED,
     check_places,
     check_shapes,
+    check_width,
     load_tensors,
     save_tensors,
 )
@@ -306,6 +307,7 @@ class HeadModel(nn.Module):
             shape, count = HeadShape(**fields), tensors["means"].shape[0]
             check_shapes(lambda: cls(shape, count), tensors)
             check_places(tensors["means"])
+            check_width(count, shape.hidden, shape.mlp_inputs)
             model = cls(shape, count)
             model.load_state_dict(tensors)
         except (SettingsError, *DAMAGED) as error:

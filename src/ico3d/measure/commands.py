@@ -53,6 +53,7 @@ class Evaluate:
 
         from ico3d.capture.formats import open_capture
         from ico3d.common.files import write_atomic
+        from ico3d.errors import printable
 
         metrics = self._metrics(open_capture(self.capture))
         if self.json is not None:
@@ -61,8 +62,9 @@ class Evaluate:
         for name, value in metrics.items():
             if isinstance(value, list):
                 continue  # parts of the whole: for the file
-            shown = f"{value:.5g}" if isinstance(value, int | float) else value
-            console.print(f"{name:16} {'not measured' if value is None else shown}")
+            shown = f"{value:.5g}" if isinstance(value, int | float) else printable(str(value))
+            said = f"{name:16} {'not measured' if value is None else shown}"
+            console.print(said, markup=False)
 
     def _metrics(self, capture: "Capture") -> dict:
         """Measures what the folder holds, whatever it is."""

@@ -51,6 +51,8 @@ _SEALED = f'{{"__metadata__":{{"{SEAL}":"'.encode()
 """How the header of a sealed file begins, behind its length in eight bytes."""
 _UNSEALED = b'{"__metadata__":{"state"'
 """How that of a file without a hash begins."""
+MOST_VALUES = 1 << 26
+"""Values of a layer, of all Gaussians: 268 MB; the paper's own have a third of them."""
 FARTHEST = 1e4
 """Largest distance of a position from the origin, metres: squares of it stay numbers."""
 _NO_SEAL = b"0" * 64
@@ -223,6 +225,20 @@ def check_places(places: Tensor) -> None:
     """
     if not (places.abs() <= FARTHEST).all():  # also where one is NaN
         raise ValueError(f"'means' lie more than {FARTHEST:,.0f} m from the origin")
+
+
+def check_width(count: int, *widths: int) -> None:
+    """Checks how much is computed of all Gaussians at once, which no file's size tells.
+
+    Args:
+        count: Number of Gaussians.
+        widths: Sizes of layers.
+
+    Raises:
+        ValueError: If a layer has more than `MOST_VALUES` of all of them.
+    """
+    if count * max(widths) > MOST_VALUES:
+        raise ValueError(f"layers of {max(widths)} values of {count} Gaussians are too large")
 
 
 def check_tensor(name: str, tensor: Tensor, size: Size, below: int | None = None) -> None:

@@ -95,7 +95,8 @@ async def test_what_is_made_of_objects_has_few(body):
 
     fits = b"data: [" + b"{}," * (bounded.MOST_PARTS // 2 - 1) + b"]\n\n"
     assert await read([fits], body=body) == fits
-    for many in (b"{}," * 501, b"1," * 1001, b"[" * 1001):
+    most = bounded.MOST_PARTS if body == STREAM else bounded.MOST_OF_WHOLE
+    for many in (b"{}," * (most // 2 + 1), b"1," * (most + 1), b"[" * (most + 1)):
         with pytest.raises(httpx2.ReadError, match="too large"):
             await read([many], body=body)
     assert len(await read([b"{}," * 10_000], path="/v1/audio/speech")) == 30_000, "it is sound"
@@ -125,6 +126,44 @@ async def test_a_stream_comes_no_faster_than_others_can_bear(monkeypatch):
     took = time.monotonic() - begun - at_once
     task.cancel()
     assert took > 0.9 * 2 * bounded.PARTS_AT_ONCE / 1e5 > at_once and others > 100
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("about", [{"path": "/audio/speech"}, {"body": b"{}"}, {"body": STREAM}])
+async def test_others_have_a_turn_while_pieces_of_a_byte_are_here(about):
+    from ico3d.chat.services import bounded
+
+    others = 0
+
+    async def somebody():
+        nonlocal others
+        while True:
+            await asyncio.sleep(0)
+            others += 1
+
+    task = asyncio.create_task(somebody())
+    await read([b"a"] * 2000, **about)
+    task.cancel()
+    assert others >= 2000 // bounded.TURN - 1
+
+
+async def test_no_cookies_are_kept():
+    from ico3d.chat.services.client import client_options
+
+    app, sent = FastAPI(), []
+
+    @app.get("/")
+    async def answer(request: Request) -> Response:
+        sent.append(request.headers.get("cookie"))
+        return Response(b"{}", headers={"Set-Cookie": "a=b; Path=/"})
+
+    async with running(app) as port:
+        url = f"http://127.0.0.1:{port}"
+        client = client_options(url, "", "test")["http_client"]
+        for _ in range(2):
+            await client.get(url)
+        await client.aclose()
+    assert sent == [None, None]
 
 
 async def test_a_large_piece_is_handed_on_in_slices():

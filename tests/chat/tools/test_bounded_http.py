@@ -41,7 +41,7 @@ async def test_answers_are_short_and_plain(monkeypatch):
     async def packed() -> Response:
         return Response(gzip.compress(bytes(10**6)), headers={"Content-Encoding": "gzip"})
 
-    transport = bounded_http.BoundedTransport(trust_env=False)
+    transport = bounded_http.BoundedTransport(2.0, trust_env=False)
     async with running(app) as port, httpx2.AsyncClient(transport=transport) as client:
         url = f"http://127.0.0.1:{port}"
         assert len((await client.get(f"{url}/1000")).content) == 1000
@@ -73,7 +73,7 @@ async def answered(monkeypatch):
             return httpx2.Response(200, headers={"Content-Type": kind}, content=sent())
 
         monkeypatch.setattr(httpx2.AsyncHTTPTransport, "handle_async_request", answer)
-        transport = bounded_http.BoundedTransport(trust_env=False)
+        transport = bounded_http.BoundedTransport(2.0, trust_env=False)
         async with (
             httpx2.AsyncClient(transport=transport) as client,
             client.stream("GET", "http://127.0.0.1/") as response,

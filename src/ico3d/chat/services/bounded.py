@@ -2,8 +2,10 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterable, AsyncIterator
 from dataclasses import dataclass
+from http.cookiejar import CookieJar
+from typing import Any
 
 import httpx2
 
@@ -14,19 +16,23 @@ MOST_OF_ERROR = 64 << 10
 MOST_OF_EVENT = 64 << 10
 """Bytes of an event of a stream, and of an answer that is no stream."""
 MOST_PARTS = 1000
-"""Objects, lists and their members of an event, of which the SDK makes objects of its own.
+MOST_OF_WHOLE = 4000
+"""Objects, lists and their members of an event, and of an answer that is no stream, of which the
+SDK makes objects of its own. Commas of prose count as well.
 
 It takes up to 0.1 ms for each, during which nobody else has a turn.
 """
 PART_RATE, PARTS_AT_ONCE = 10_000.0, 30_000.0
 """Parts per second of a stream for long, and at once: for long some 200 events of a model.
 
-A faster server is read later, which nobody hears: a voice takes five words a second.
+A faster server is read later, which nobody hears of an answer: a voice takes five words a second.
 """
 BREAK = 10
 """Parts as which the end of a line counts, and a piece that the network hands over."""
 SLICE = 4 << 10
 """Bytes of a stream that are handed on at once."""
+TURN = 32
+"""Pieces of an answer after which others have a turn."""
 SOUND = "/audio/speech"
 """End of the address at which sound is asked for, which has no lines."""
 STREAMED = b'"stream":true'
@@ -79,13 +85,23 @@ async def bound(response: httpx2.Response, most: int | None = None) -> None:
     elif asks_for_stream(request):
         response.stream = _Paced(stream, most, Limits(MOST_OF_EVENT, MOST_PARTS))
     else:
-        response.stream = Whole(stream, Limits(min(most, MOST_OF_EVENT), MOST_PARTS))
+        response.stream = Whole(stream, Limits(min(most, MOST_OF_EVENT), MOST_OF_WHOLE))
 
 
 def asks_for_stream(request: httpx2.Request) -> bool:
     """Whether a request asks for a stream of events."""
     is_json = request.headers.get("Content-Type", "").startswith("application/json")
     return is_json and STREAMED in request.content
+
+
+class NoCookies(CookieJar):
+    """Keeps no cookies: a server could send thousands with each answer, which go back to it."""
+
+    def extract_cookies(self, response: Any, request: Any) -> None:
+        """Looks at no answer."""
+
+    def add_cookie_header(self, request: Any) -> None:
+        """Adds nothing to a request."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +182,19 @@ class Wrapped(httpx2.AsyncByteStream):
         await self._stream.aclose()
 
 
+async def taking_turns(stream: AsyncIterable[bytes]) -> AsyncIterator[bytes]:
+    """The pieces of an answer; others have a turn in between.
+
+    One read of the network may hold ten thousand pieces of a byte.
+    """
+    count = 0
+    async for piece in stream:
+        count += 1
+        if count % TURN == 0:
+            await asyncio.sleep(0)
+        yield piece
+
+
 class Whole(Wrapped):
     """The bytes of an answer that is made something of when all has come."""
 
@@ -181,7 +210,7 @@ class Whole(Wrapped):
             ReadError: If there are too many.
         """
         amount = Amount(self._limits)
-        async for piece in self._stream:
+        async for piece in taking_turns(self._stream):
             amount.add(piece)
             yield piece
 
@@ -206,8 +235,7 @@ class _Paced(Wrapped):
                 now = time.monotonic()
                 ahead = max(0.0, ahead - (now - seen) * PART_RATE) + cost_of(part)
                 seen = now
-                if ahead > PARTS_AT_ONCE:
-                    await asyncio.sleep((ahead - PARTS_AT_ONCE) / PART_RATE)
+                await asyncio.sleep(max(0.0, ahead - PARTS_AT_ONCE) / PART_RATE)
                 yield part
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from openai import DefaultAsyncHttpxClient
 
-from ico3d.chat.services.bounded import ask_plain, bound
+from ico3d.chat.services.bounded import NoCookies, ask_plain, bound
 from ico3d.chat.settings.keys import NONE, OPENAI, goes_here, is_openai, key_for
 
 OWN_HEADERS = ("OpenAI-Organization", "OpenAI-Project")
@@ -45,6 +45,7 @@ def client_options(
         verify=secure,
         trust_env=not goes_here(url),
         event_hooks=hooks,
+        cookies=NoCookies(),
         **http,
     )
     return {"api_key": key, "base_url": url or OPENAI, "http_client": client}

@@ -14,16 +14,20 @@ from ico3d.chat.services.bounded import (
     ask_plain,
     ensure_plain,
     is_events,
+    taking_turns,
 )
 from ico3d.chat.supervision.allowance import Bucket
 
-MESSAGE = Limits(1 << 20, 16_000)
+MESSAGE = Limits(1 << 20, 8_000)
 """Bytes and parts of an answer, which may be the list of all functions.
 
 Of each part that does not fit the protocol the SDK makes several errors, of 20 kB in all.
 """
 ENDING = 2.0
 """Seconds in which a server may answer that a session ends."""
+BYTE_RATE, BYTES_AT_ONCE = 256e3, 8e6
+"""Bytes of a server's events per second for long, and at once: what it asks of a client is kept
+until that is answered."""
 LINE_RATE, LINES_AT_ONCE = 200.0, 4000.0
 """Lines of a server's events per second for long, and at once: each costs the loop of all visitors
 time. An event has three or four."""
@@ -40,9 +44,16 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
     ends a session is answered within `ENDING`, or not at all.
     """
 
-    def __init__(self, trust_env: bool = True):
-        """Connects; proxies that the environment names are used if that is trusted."""
+    def __init__(self, seconds: float, trust_env: bool = True):
+        """Connects.
+
+        Args:
+            seconds: Longest silence of an answer to what is sent.
+            trust_env: Whether proxies are used that the environment names.
+        """
         super().__init__(trust_env=trust_env)
+        self._seconds = seconds
+        self._bytes = Bucket(BYTE_RATE, BYTES_AT_ONCE, time.monotonic)
         self._lines = Bucket(LINE_RATE, LINES_AT_ONCE, time.monotonic)  # of all streams
         self._streams = Bucket(STREAM_RATE, STREAMS_AT_ONCE, time.monotonic)
 
@@ -57,13 +68,16 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
         if request.method == "GET":
             while not self._streams.take(1):
                 await asyncio.sleep(1 / STREAM_RATE)
+        if request.method == "POST":
+            waits = dict(request.extensions.get("timeout", {}))
+            request.extensions = {**request.extensions, "timeout": waits | {"read": self._seconds}}
         if request.method == "DELETE":
             return await self._ended(request)
         response = await super().handle_async_request(request)
         await ensure_plain(response)
         stream = response.stream
         if is_events(response):
-            response.stream = _Paced(stream, self._lines)
+            response.stream = _Paced(stream, self._lines, self._bytes)
         else:
             response.stream = Whole(stream, MESSAGE)
         return response
@@ -82,15 +96,21 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
 class _Paced(Wrapped):
     """The bytes of a stream of events, as long as their lines do not come too fast."""
 
-    def __init__(self, stream: httpx2.SyncByteStream | httpx2.AsyncByteStream, lines: Bucket):
+    def __init__(
+        self,
+        stream: httpx2.SyncByteStream | httpx2.AsyncByteStream,
+        lines: Bucket,
+        amount: Bucket,
+    ):
         super().__init__(stream)
-        self._lines = lines
+        self._lines, self._amount = lines, amount
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
         last, events = b"", Events(MESSAGE)
-        async for piece in self._stream:
+        async for piece in taking_turns(self._stream):
             events.add(piece)
-            if not self._lines.take(_ends(last + piece) - _ends(last)):
+            ends = _ends(last + piece) - _ends(last)
+            if not self._lines.take(ends) or not self._amount.take(len(piece)):
                 raise httpx2.ReadError("it sends too many events")
             last = piece[-1:]
             yield piece

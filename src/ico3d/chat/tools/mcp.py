@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 LONGEST_NAME = 64  # that models accept for a function
 LONGEST_COMPLAINT = 200
-LONGEST_END = 4.0  # s in which a connection ends, and again after it was given up
+LONGEST_END = 10.0  # s in which a connection ends: a program is asked twice, and killed after 4
 MOST_FUNCTIONS = 64  # of a server: all their descriptions are part of every question
 
 Offer = Callable[[list[FunctionSchema]], None]
@@ -188,14 +188,19 @@ async def over_http(server: McpServer) -> AsyncIterator["Client"]:
     from mcp import Client
     from mcp.client.streamable_http import streamable_http_client
 
+    from ico3d.chat.services.bounded import NoCookies
     from ico3d.chat.tools.bounded_http import BoundedTransport
 
     headers = filled_in(server.headers, server.where)
     limits = httpx2.Timeout(server.seconds, read=None)  # a stream is silent between calls
-    sending = BoundedTransport(trust_env=False)
+    sending = BoundedTransport(server.seconds, trust_env=False)
     async with (
         httpx2.AsyncClient(
-            headers=headers, timeout=limits, trust_env=False, transport=sending
+            headers=headers,
+            timeout=limits,
+            trust_env=False,
+            transport=sending,
+            cookies=NoCookies(),
         ) as http,
         Client(streamable_http_client(server.url, http_client=http)) as client,
     ):

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import itertools
 import re
+import time
 
 import pytest
 from hypothesis import given
@@ -307,3 +308,14 @@ IN_MARKS = re.compile(
 def test_a_text_without_marks_is_said_as_it_is(text, cuts):
     assert streamed("A" + text, cuts, False) == "A" + text
     assert streamed("A" + text, cuts, None) == "A" + text
+
+
+@pytest.mark.parametrize("opened", [None, False])
+def test_thoughts_in_pieces_take_time_in_proportion_to_their_length(opened):
+    """Each piece copied all before it: one answer stopped the server for two minutes."""
+    thoughts = Thoughts(opened)
+    thoughts.push("" if opened is None else "<think><think></think>")
+    begun = time.process_time()
+    for _ in range(4000):
+        thoughts.push("🙂" + "a" * 1000)
+    assert time.process_time() - begun < 2.0

@@ -1,6 +1,7 @@
 """pipecat's OpenAI service, adapted to servers that lack some of OpenAI's features."""
 
 import contextlib
+import re
 from collections.abc import AsyncGenerator, Sequence
 from contextvars import ContextVar
 from dataclasses import replace
@@ -31,6 +32,8 @@ MOST_CALLS = 8
 """Functions that one answer may call: a visitor can talk a model into asking for many."""
 COMPLETE = ("stop", "tool_calls", "function_call")
 """Reasons for the end of an answer that was not cut off."""
+_BLANKS = re.compile(r"(\s{64})\s+")
+"""More blanks than anybody writes; the marks between clauses are looked for one by one."""
 _opens: dict[tuple[str, str], bool] = {}
 """By server and model: whether its chat template opens a thought, so that a stream holds only the
 end of it. One answer tells (`warm_up` asks for one); of a model that is not in here the first is
@@ -186,7 +189,7 @@ class CompatibleModel(OpenAILLMService):
         if apart:
             await self._tell(thoughts.separate())
         if delta.content:
-            parts = thoughts.push(sendable(delta.content))
+            parts = thoughts.push(_BLANKS.sub(r"\1", sendable(delta.content)))
             delta.content = parts.said or None
             apart = apart if parts.said else (apart or "") + parts.thought
         if apart is not None:

@@ -83,8 +83,9 @@ class Thoughts:
         self.opened, self.lone, self.begun = opened, False, False
         self._depth = 1 if opened else 0
         self._rest = ""  # may be the beginning of a mark
-        self._after = ""  # what came since a thought ended within another
-        self._held = ""  # an answer, or a thought whose end will show what it was
+        # Lists, joined once: thoughts come in thousands of pieces.
+        self._after = list[str]()  # what came since a thought ended within another
+        self._held = list[str]()  # an answer, or a thought whose end will show what it was
         self._fresh = True  # nothing has come, white space aside
         self._closed = False  # a thought has ended
 
@@ -101,12 +102,12 @@ class Thoughts:
                 self._open()
             elif self._depth:
                 self._depth = 0 if mark["final"] else self._depth - (mark["close"] is not None)
-                self._after = ""
+                self._after = []
                 self._closed = self._closed or mark["close"] is not None
             elif mark["close"]:
-                thought += [self._held, *said]
+                thought += [*self._held, *said]
                 said.clear()
-                self._held, self.opened, self.lone = "", False, True
+                self._held, self.opened, self.lone = [], False, True
         cut = at + _whole(text[at:])
         self._rest = text[cut:]
         _add(self._take(text[at:cut]), said, thought)
@@ -114,7 +115,7 @@ class Thoughts:
 
     def separate(self) -> Parts:
         """Notes that the server separates thoughts itself, so its text is the answer."""
-        held, self._held = self._held, ""
+        held, self._held = "".join(self._held), []
         if self.opened is None:
             self.opened = False
         return Parts(self._spoken(held))
@@ -131,17 +132,18 @@ class Thoughts:
         rest, self._rest = self._take(self._rest), ""
         parts = self.separate() + rest
         if complete and self._depth and not self.begun:
-            parts += Parts(self._spoken(self._after))
+            parts += Parts(self._spoken("".join(self._after)))
         return parts
 
     def _take(self, text: str) -> Parts:
         """Text without marks."""
         self._fresh = self._fresh and not text.strip()
         if self._depth:
-            self._after += text if self._closed else ""
+            if self._closed:
+                self._after.append(text)
             return Parts("", text)
         if self.opened is None:
-            self._held += text
+            self._held.append(text)
             return Parts()
         return Parts(self._spoken(text))
 
