@@ -122,7 +122,8 @@ def test_a_limb_pushes_points_to_its_surface(seed):
 def _gaps(points, ends, radii):
     """(…,) metres between points (…, 3) and a limb."""
     along = ends[1] - ends[0]
-    part = np.clip((points - ends[0]) @ along / (along @ along), 0, 1)
+    long = max(along @ along, 1e-12)  # a limb may be a ball
+    part = np.clip((points - ends[0]) @ along / long, 0, 1)
     axis = ends[0] + part[..., None] * along
     return np.linalg.norm(points - axis, axis=-1) - (radii[0] + part * (radii[1] - radii[0]))
 

@@ -117,8 +117,8 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
         coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
         subject = smoothed(_with_turning_eyes(subject), np.isin(subject.materials, coarse))
         subject = _with_soft_armpits(subject) if whole else subject
-        # A sleeve's triangles of 16 mm showed at its outline and at the armpit.
-        return smoothed(subject, np.isin(subject.materials, WORN)) if whole else subject
+        # Shade is found at vertices: those of a sleeve lay 16 mm apart.
+        return smoothed(subject, np.isin(subject.materials, WORN), 0.0) if whole else subject
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:

@@ -12,12 +12,13 @@ BULGE = 0.75
 """How far new vertices move from the flat triangle (0) to the curved surface (1)."""
 
 
-def smoothed(subject: Subject, chosen: np.ndarray) -> Subject:
+def smoothed(subject: Subject, chosen: np.ndarray, bulge: float = BULGE) -> Subject:
     """Splits triangles into four that bulge as their normals imply (Phong tessellation).
 
     Args:
         subject: The person; landmarks and eyes are not changed.
         chosen: (F,) bool, the faces to split; they must not share edges with unsplit faces.
+        bulge: How far new vertices move from the flat triangle (0) to the curved surface (1).
     """
     coarse = subject.faces[chosen]
     if len(coarse) == 0:
@@ -28,7 +29,7 @@ def smoothed(subject: Subject, chosen: np.ndarray) -> Subject:
     ab, bc, ca = (len(subject.vertices) + edge_of).reshape(-1, 3).T
     split = np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])  # (4, 3, F)
     faces = split.transpose(2, 0, 1).reshape(-1, 3)
-    vertices = np.concatenate([subject.vertices, _edge_middles(subject, edges)])
+    vertices = np.concatenate([subject.vertices, _edge_middles(subject, edges, bulge)])
     delta_vertices, deltas = _split_deltas(subject, edges)
     return replace(
         subject,
@@ -83,10 +84,10 @@ def _split_skeleton(subject: Subject, edges: np.ndarray) -> Skeleton | None:
     return replace(subject.skeleton, weights=np.concatenate([weights, middles]))
 
 
-def _edge_middles(subject: Subject, edges: np.ndarray) -> np.ndarray:
+def _edge_middles(subject: Subject, edges: np.ndarray, bulge: float) -> np.ndarray:
     """(E, 3) points in the middle of edges, moved onto the curved surface."""
     normals = vertex_normals(subject.vertices, subject.faces)
     ends, across = subject.vertices[edges], normals[edges]  # (E, 2, 3) each
     middle = ends.mean(axis=1)
     above = ((ends - middle[:, None]) * across).sum(axis=2, keepdims=True)  # (E, 2, 1)
-    return middle + BULGE * (above * across).mean(axis=1)
+    return middle + bulge * (above * across).mean(axis=1)

@@ -248,7 +248,7 @@ async def test_a_header_that_claims_what_is_no_speech_is_an_error(
 )
 async def test_a_header_is_read_wherever_the_pipeline_would(before, form, reason):
     header = bytearray(as_wav(tone(2400), 24_000))
-    struct.pack_into("<4s12xI", header, 8, form, 10)
+    header[8:12], header[24:28] = form, struct.pack("<I", 10)
 
     async def pieces():
         if before:
