@@ -141,6 +141,37 @@ async def test_a_program_is_started_and_its_functions_called(sdk, monkeypatch):
         os.kill(process, 0)
 
 
+STUBBORN = """
+import json, os, pathlib, signal, sys, time
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+pathlib.Path(sys.argv[1]).write_text(str(os.getpid()))
+info = {"capabilities": {"tools": {}}, "serverInfo": {"name": "stubborn", "version": "1"}}
+tools = {"tools": [{"name": "t", "inputSchema": {"type": "object"}}]}
+for line in sys.stdin:
+    asked = json.loads(line)
+    known = {"initialize": info, "tools/list": tools}
+    if asked.get("method") == "initialize":
+        info["protocolVersion"] = asked["params"]["protocolVersion"]
+    if "id" in asked:
+        no = {"error": {"code": -32601, "message": "no such method"}}
+        said = {"result": known[asked["method"]]} if asked["method"] in known else no
+        print(json.dumps({"jsonrpc": "2.0", "id": asked["id"], **said}), flush=True)
+while True:
+    time.sleep(1)
+"""
+"""A server that takes no notice of the end of what it reads, nor of SIGTERM."""
+
+
+@pytest.mark.real_time
+async def test_a_program_that_does_not_want_to_end_is_ended(sdk, tmp_path):
+    command = (sys.executable, "-c", STUBBORN, str(tmp_path / "pid"))
+    connection = Connection(McpServer("m", command=command))
+    assert [one.name for one in await connection.functions()] == ["m_t"]
+    await connection.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
 @pytest.mark.real_time
 async def test_answers_are_compared_with_no_schema_of_the_server(sdk, monkeypatch):
     """Its patterns may take for ever, and the server of visitors would wait for them."""
