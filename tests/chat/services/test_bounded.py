@@ -1,6 +1,7 @@
 """What servers of services answer is bounded: its length, its parts, its pace, its calls."""
 
 import asyncio
+import contextlib
 import gzip
 import time
 
@@ -37,6 +38,21 @@ async def read(content, **about) -> bytes:
 
 
 STREAM = b'{"model":"m","stream":true}'
+
+
+@contextlib.asynccontextmanager
+async def others():
+    """A list of the turns that somebody else has meanwhile."""
+    turns = []
+
+    async def somebody():
+        while True:
+            await asyncio.sleep(0)
+            turns.append(time.monotonic())
+
+    task = asyncio.create_task(somebody())
+    yield turns
+    task.cancel()
 
 
 async def test_answers_are_short_and_plain(monkeypatch):
@@ -113,19 +129,10 @@ async def test_a_stream_comes_no_faster_than_others_can_bear(monkeypatch):
     begun = time.monotonic()
     await read([event] * few, body=STREAM)
     at_once = time.monotonic() - begun
-    others = 0
-
-    async def somebody():
-        nonlocal others
-        while True:
-            await asyncio.sleep(0)
-            others += 1
-
-    task = asyncio.create_task(somebody())
-    await read([event] * many, body=STREAM)
+    async with others() as turns:
+        await read([event] * many, body=STREAM)
     took = time.monotonic() - begun - at_once
-    task.cancel()
-    assert took > 0.9 * 2 * bounded.PARTS_AT_ONCE / 1e5 > at_once and others > 100
+    assert took > 0.9 * 2 * bounded.PARTS_AT_ONCE / 1e5 > at_once and len(turns) > 100
 
 
 @pytest.mark.real_time
@@ -133,18 +140,9 @@ async def test_a_stream_comes_no_faster_than_others_can_bear(monkeypatch):
 async def test_others_have_a_turn_while_pieces_of_a_byte_are_here(about):
     from ico3d.chat.services import bounded
 
-    others = 0
-
-    async def somebody():
-        nonlocal others
-        while True:
-            await asyncio.sleep(0)
-            others += 1
-
-    task = asyncio.create_task(somebody())
-    await read([b"a"] * 2000, **about)
-    task.cancel()
-    assert others >= 2000 // bounded.TURN - 1
+    async with others() as turns:
+        await read([b"a"] * 2000, **about)
+    assert len(turns) >= 2000 // bounded.TURN - 1
 
 
 async def test_no_cookies_are_kept():
