@@ -33,6 +33,7 @@ from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
 from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.cli import run_script
+from ico3d.common.files import write_atomic
 from ico3d.motion.recorded.cut import CUTS, to_toml
 from ico3d.rig.rig import Rig
 from ico3d.studio.person.choice import load_subject
@@ -137,9 +138,8 @@ class Demo:
             os.environ[name] = str(self.threads)
         person = work / self.subject.name
         if not person.exists():
-            work.mkdir(parents=True, exist_ok=True)
             arrays: dict[str, Any] = slenderer(dict(np.load(self.subject)), SLENDER)
-            np.savez_compressed(person, **arrays)
+            write_atomic(person, lambda path: np.savez_compressed(path, **arrays))
         # moods and glances are nothing that a voice could drive
         self._record(person, work / "head-capture", "head", self.head_shot)
         body = (work / "body-capture", "body", self.body_shot)

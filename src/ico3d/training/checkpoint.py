@@ -52,7 +52,7 @@ _SEALED = f'{{"__metadata__":{{"{SEAL}":"'.encode()
 _UNSEALED = b'{"__metadata__":{"state"'
 """How that of a file without a hash begins."""
 MOST_VALUES = 1 << 26
-"""Values of a layer, of all Gaussians: 268 MB; the paper's own have a third of them."""
+"""Values of a layer, of all Gaussians together: 268 MB."""
 FARTHEST = 1e4
 """Largest distance of a position from the origin, metres: squares of it stay numbers."""
 _NO_SEAL = b"0" * 64

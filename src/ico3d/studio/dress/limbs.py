@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ico3d.errors import SettingsError
+from ico3d.studio.person.edges import sides
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.subject import CARDS, Subject
 
@@ -132,7 +133,7 @@ def _columns(bones: Skeleton, starts: tuple[str, ...], side: str = "") -> list[i
 def _cut(subject: Subject, chosen: np.ndarray, above: np.ndarray) -> np.ndarray:
     """(P, 3) where edges between chosen vertices pass a plane that they are `above` (V,)."""
     faces = subject.faces[~np.isin(subject.materials, CARDS)]
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = sides(faces)
     edges = np.unique(edges[chosen[edges].all(axis=1)], axis=0)
     first, second = above[edges].T.astype(float)
     crossing = (first < 0) != (second < 0)

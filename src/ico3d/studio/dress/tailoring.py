@@ -7,7 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from ico3d.studio.person.edges import open_loops
+from ico3d.studio.person.edges import open_loops, sides
 from ico3d.studio.person.subject import Material, Subject
 
 COLLAR_RIB, HEM_RIB, LEG_HEM = 0.026, 0.055, 0.022
@@ -79,7 +79,7 @@ def tailored(subject: Subject) -> Tailored:
     """Finds edges, seams and folds of a person's clothes."""
     clothes = np.isin(subject.materials, (Material.CLOTH, Material.TROUSERS))
     faces = subject.faces[clothes]
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = np.unique(sides(faces), axis=0)
     places, axis = _fold_places(subject)
     span = subject.vertices[edges[:, 1]] - subject.vertices[edges[:, 0]]  # (E, 3)
     lengths = np.maximum(np.linalg.norm(span, axis=1), 1e-6)

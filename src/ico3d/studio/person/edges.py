@@ -1,4 +1,4 @@
-"""Edges at which garments end, and skin that they cover."""
+"""Edges of meshes: those at which garments end, and skin that they cover."""
 
 from dataclasses import replace
 
@@ -15,11 +15,15 @@ NECK = 0.13
 """Largest distance in metres of such skin from the collar, so that hands are none."""
 
 
+def sides(faces: np.ndarray) -> np.ndarray:
+    """(3F, 2) sides of triangles (F, 3), the lower vertex first; what two share comes twice."""
+    return np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+
+
 def open_loops(subject: Subject, material: Material) -> list[np.ndarray]:
     """Vertices (N,) of each edge at which a garment's mesh ends."""
     faces = subject.faces[subject.materials == material]
-    corners = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(corners, axis=0, return_counts=True)
+    edges, count = np.unique(sides(faces), axis=0, return_counts=True)
     ends = edges[count == 1]
     if len(ends) == 0:
         return []

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from ico3d.common.unpacking.npz import read_npz
 from ico3d.errors import CaptureError
-from ico3d.studio.person.edges import without_covered_neck
+from ico3d.studio.person.edges import sides, without_covered_neck
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.smooth import smoothed
 from ico3d.studio.person.subject import GARMENTS, Eye, Look, Material, Subject
@@ -116,9 +116,10 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
         subject = without_covered_neck(_subject(path.stem, arrays, whole))
         coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
         subject = smoothed(_with_turning_eyes(subject), np.isin(subject.materials, coarse))
-        subject = _with_soft_armpits(subject) if whole else subject
+        if not whole:
+            return subject
         # Shade is found at vertices: those of a sleeve lay 16 mm apart.
-        return smoothed(subject, np.isin(subject.materials, WORN), 0.0) if whole else subject
+        return smoothed(_with_soft_armpits(subject), np.isin(subject.materials, WORN), 0.0)
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:
@@ -269,8 +270,7 @@ def _with_soft_armpits(subject: Subject) -> Subject:
         return subject
     knit = subject.faces[subject.materials == Material.CLOTH]
     worn = np.unique(knit)
-    edges = np.searchsorted(worn, knit[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
-    a, b = np.unique(np.sort(edges, axis=1), axis=0).T
+    a, b = np.searchsorted(worn, np.unique(sides(knit), axis=0)).T
     rows, columns = np.r_[a, b], np.r_[b, a]
     share_of = 1 / np.bincount(rows, minlength=len(worn))
     around = csr_array((share_of[rows], (rows, columns)), shape=(len(worn), len(worn)))

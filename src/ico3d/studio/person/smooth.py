@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ico3d.studio.person.edges import sides
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.subject import Subject
 from ico3d.studio.raster import vertex_normals
@@ -23,8 +24,7 @@ def smoothed(subject: Subject, chosen: np.ndarray, bulge: float = BULGE) -> Subj
     coarse = subject.faces[chosen]
     if len(coarse) == 0:
         return subject
-    corners = coarse[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # (3F, 2)
-    edges, edge_of = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True)
+    edges, edge_of = np.unique(sides(coarse), axis=0, return_inverse=True)
     a, b, c = coarse.T
     ab, bc, ca = (len(subject.vertices) + edge_of).reshape(-1, 3).T
     split = np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])  # (4, 3, F)
