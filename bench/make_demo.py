@@ -4,9 +4,9 @@
 
 The same command goes on where it was stopped, at the next picture or from the latest checkpoint;
 what WORK holds already is not made again, and the seed decides everything. Head and body are
-recorded in one light, the head from near: docs/avatars.md, "The packaged avatar". Look at
-WORK/check, WORK/strip.png (recorded | exact | baked) and WORK/gestures.mp4 before shipping it. The
-skeleton needs MediaPipe's models: ico3d weights fetch pose-landmarker hand-landmarker.
+recorded in one light, the head from near: docs/avatars.md, "The packaged avatar". The skeleton is
+the studio's own, as a motion-capture suit would tell it. Look at WORK/check, WORK/strip.png
+(recorded | exact | baked) and WORK/gestures.mp4 before shipping it.
 """
 
 import os
@@ -35,11 +35,13 @@ from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.cli import run_script
 from ico3d.common.files import write_atomic
 from ico3d.motion.recorded.cut import CUTS, to_toml
+from ico3d.rig.body_track import track_file, write_body_track
 from ico3d.rig.rig import Rig
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.rigs import cameras_of
 from ico3d.studio.studio import Studio
+from ico3d.studio.truth import true_track
 
 MAX_BYTES, MAX_FIRST_BYTES = 12 << 20, 3 << 20
 """Most bytes of the bundle, and of what a page needs before it shows somebody."""
@@ -55,8 +57,6 @@ sleeves are broad for their heads."""
 SHOULDERS, ARM = 0.02, "shoulder01"
 """Metres by which each arm is moved inwards once she is baked, since builds leave the skeleton as
 it is, and the joints that begin an arm."""
-HANGING = 0.96
-"""Width of the trunk beside which arms hang, as a multiple of the recorded one."""
 TRIED = 2
 """Cameras whose pictures are timed before recording."""
 
@@ -145,8 +145,8 @@ class Demo:
         body = (work / "body-capture", "body", self.body_shot)
         self._record(person, *body, "--motion", "repertoire")
         self._train_head(work / "head-capture", work / "head")
-        if not (work / "body-capture" / "body_track.safetensors").exists():
-            ico3d("capture pose", work / "body-capture", "--workers", self.threads)
+        if not track_file(work / "body-capture").exists():
+            write_body_track(true_track(work / "body-capture", person), work / "body-capture")
         parts = (work / "head", work / "body-capture", work / "avatar")
         how = ("--method", "skinned", *self.body.split(), "--check", work / "check")
         ico3d("assemble", *parts, *seed, *how)
@@ -207,7 +207,7 @@ def write_narrower(path: Path) -> None:
     old = (HEAD_REST, SKINNED_REST)
     files = {name: bundle.read(name) for name in bundle.manifest.files if name not in old}
     files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()}
-    files |= gesture_files(body, (), HANGING)
+    files |= gesture_files(body, (), 1.0)
     person = BakedAvatar(head, SkinnedBody(body), poses)
     first = person.gaussians(0.0, bundle.manifest.head.idle_expression)
     files[THUMBNAIL] = thumbnail(first, bundle.manifest.camera, bundle.manifest.background)

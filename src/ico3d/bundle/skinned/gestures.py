@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.hanging_arms import hung_beside
 from ico3d.bundle.skinned.posing import recorded_rotations
 from ico3d.errors import BundleError, SettingsError
 from ico3d.motion.clip import Clip
@@ -22,15 +23,15 @@ GESTURES = "body/gestures.safetensors"
 
 
 def gesture_files(
-    baked: BakedSkinned, cuts: Sequence[Cut] | None = None, width: float = 1.0
+    baked: BakedSkinned, cuts: Sequence[Cut] | None = None, width: float | None = None
 ) -> dict[str, bytes]:
     """Makes the file of gestures: recorded ones, and the package's where none was recorded.
 
     Args:
         baked: The body, as the bundle holds it.
         cuts: Gestures in the recording; None finds them by rule.
-        width: How many times as wide as the recorded one the trunk is. Where that is not 1, arms
-            hang as near to it as it allows, and not as they hung in the recording.
+        width: How many times as wide as the recorded one the trunk is. Where that is told, arms
+            hang as near to the body as it allows, and not as they hung in the recording.
 
     Returns:
         Content of the file by its name; empty where the rig lacks a person's roles.
@@ -39,10 +40,12 @@ def gesture_files(
     if recording is None:
         return {}
     info, cuts = baked.info, find_cuts(recording) if cuts is None else cuts
-    if width != 1:
+    if width is not None:
         recording = replace(recording, person=_widened(recording.person, width))
         cuts = [cut for cut in cuts if cut.name != REST]
-    somebody = living(baked.rig, 0, hung_in(recording, cuts))
+    rests = any(cut.name == REST for cut in cuts)
+    hung = hung_in(recording, cuts) if rests else hung_beside(baked, recording.person)
+    somebody = living(baked.rig, 0, hung)
     others = library(recording.person, hung=somebody.hung)
     clips = preferring(recorded_clips(recording, cuts), others)
     text = to_toml(cuts, info.fps, info.num_frames)

@@ -26,12 +26,12 @@ SIDEWARDS, FORWARD = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 def hanging(person: Person) -> Array:
     """(R, 4) pose by role with hanging arms and relaxed fingers, else the standard pose."""
-    poses = _hung(np.arange(0.0, MOST, np.radians(0.5)))  # (N, R, 4)
+    poses = hung_at(np.arange(0.0, MOST, np.radians(0.5)))  # (N, R, 4)
     clear = np.flatnonzero(_clear(person, poses))
     return poses[clear[0] if len(clear) else -1]
 
 
-def _hung(lifted: Array) -> Array:
+def hung_at(lifted: Array) -> Array:
     """(N, R, 4) poses by role with hanging arms that are lifted sideways by (N,) radians."""
     poses = np.tile(IDENTITY, (len(lifted), len(ROLES), 1))  # (N, R, 4)
     upper = multiply(about(FORWARD, lifted), about(SIDEWARDS, BACK))
