@@ -53,7 +53,7 @@ test('a network that stalls while the microphone is open is noticed, brings no o
   const late = after.filter((chunk) => recorded(chunk, microphone) < flowed);
   const old = ((during.length + late.length) * MICROPHONE_CHUNK) / MICROPHONE_RATE;
   console.log(`of ${STALL / 1000} s ${during.length} chunks were sent meanwhile and ${late.length} late: ${old.toFixed(2)} s of old sound`);
-  expect(old).toBeLessThan(1.1);
+  expect(old).toBeLessThan(1 + 0.1 * slowness()); // a busy page sees late that the line is full
   expect(gone).toBeLessThan(6000 * slowness());
 
   const understood = await until(browser, ({ received }) =>

@@ -35,6 +35,12 @@ beforeAll(async () => {
 });
 afterAll(() => browser?.close());
 
+/** Whether the greeting of the newest conversation has been said and heard. */
+function greeted(received: { type: string; state?: string }[]): boolean {
+  const since = received.slice(received.findLastIndex(({ type }) => type === 'welcome'));
+  return since.some(({ type }) => type === 'end') && since.findLast(({ type }) => type === 'state')?.state === 'idle';
+}
+
 const record = () => browser.page.locator('#record > div').allTextContents();
 const announced = () => browser.page.locator('#announcer p').allTextContents();
 
@@ -267,6 +273,7 @@ test('the visitor chooses language and captions, which are remembered; all of it
   const kept = await page.evaluate(() => ({ ...localStorage }));
   expect(kept).toMatchObject({ 'ico3d-language': 'de', 'ico3d-captions-shown': 'on', 'ico3d-captions-size': 'large' });
   await page.keyboard.press('Escape');
+  await until(browser, ({ received }) => greeted(received)); // the focus goes from "Stop" to the text box when the greeting ends
   const reached = new Set<string>();
   await page.focus('#stage');
   for (let i = 0; i < 30 && !reached.has('send'); i++) {

@@ -1,8 +1,9 @@
 import * as THREE from 'three';
 import type { Backcloth } from '../soft/contract.ts';
-import { footprintOf, type Ground } from './camera/ground.ts';
+import { footprintOf, type Ground, type Patch } from './camera/ground.ts';
 
 const SHADOW = [0.3, 0.22] as const; // m to the side and to the front where it has faded to a third, until feet are known
+const SHADES = { far: 0.34, near: 0.12, sole: 0.42 } as const; // share of the light that is missing: around the feet, between them, under a sole
 const NOTICED = 0.004; // m by which feet move before their shadow does
 const LAMP = 0.12; // m over the eyes: the middle of the light on the wall
 const POOL = 0.45; // m from there to where half of the light is gone
@@ -18,6 +19,15 @@ const ROOMS: Record<'dark' | 'bright', Record<'lit' | 'unlit', readonly [number,
  * were trained. Of a head alone less is known: its edges hold some of the place where it was recorded.
  */
 const OWN = { person: 0.75, head: 0.25 };
+
+/** Where shadows lie, as the shader reads it. */
+interface Uniforms {
+  under: { value: THREE.Vector3 };
+  shadow: { value: THREE.Vector2 };
+  soles: { value: THREE.Vector3[] };
+  sizes: { value: THREE.Vector2[] };
+  depth: { value: number };
+}
 
 /**
  * A room behind all Gaussians: a wall in the light of a lamp that falls off around whoever stands before it, a
@@ -43,6 +53,8 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       front: { value: new THREE.Vector3(0, 0, 1) },
       shadow: { value: new THREE.Vector2(...SHADOW) },
       under: { value: new THREE.Vector3() },
+      soles: { value: [new THREE.Vector3(), new THREE.Vector3()] },
+      sizes: { value: [new THREE.Vector2(), new THREE.Vector2()] }, // 0 without a sole
       depth: { value: 1 },
       alone: { value: 0 },
     };
@@ -70,6 +82,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     uniforms.foot!.value.copy(foot);
     uniforms.under!.value.copy(foot);
     uniforms.shadow!.value.set(...SHADOW);
+    this.press([]);
     uniforms.up!.value.copy(up);
     uniforms.front!.value.copy(toward);
     uniforms.lamp!.value.copy(eyes).addScaledVector(up, LAMP);
@@ -89,12 +102,36 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     this.followed = points;
     const print = footprintOf(points, this.ground);
     if (!print) return;
-    const { under, shadow } = this.material.uniforms as { under: { value: THREE.Vector3 }; shadow: { value: THREE.Vector2 } };
+    const { under, shadow } = this.uniforms;
     const size = new THREE.Vector2(...print.size);
-    if (under.value.distanceTo(print.middle) < NOTICED && shadow.value.distanceTo(size) < NOTICED) return;
+    const still = under.value.distanceTo(print.middle) < NOTICED && shadow.value.distanceTo(size) < NOTICED;
+    if (still && !this.steps(print.soles)) return;
     under.value.copy(print.middle);
     shadow.value.copy(size);
+    this.press(print.soles);
     this.version++;
+  }
+
+  /** Whether soles have moved, come or gone. */
+  private steps(now: readonly Patch[]): boolean {
+    const { soles, sizes } = this.uniforms;
+    return sizes.value.some((size, i) => {
+      const sole = now[i];
+      return sole ? size.x === 0 || soles.value[i]!.distanceTo(sole.middle) >= NOTICED : size.x > 0;
+    });
+  }
+
+  /** Puts the shadows of soles where they touch the floor. */
+  private press(now: readonly Patch[]): void {
+    const { soles, sizes } = this.uniforms;
+    for (const [i, size] of sizes.value.entries()) {
+      size.set(...(now[i]?.size ?? ([0, 0] as const)));
+      soles.value[i]!.copy(now[i]?.middle ?? this.uniforms.under.value);
+    }
+  }
+
+  private get uniforms(): Uniforms {
+    return this.material.uniforms as unknown as Uniforms;
   }
 
   /** Draws the shadow alone, on what is behind the picture. */
@@ -123,7 +160,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
 
   /** The same as the shader, for pictures that are drawn without. */
   colour(eye: THREE.Vector3, way: THREE.Vector3, out: Float32Array, at: number): void {
-    const { lit, unlit, lamp, foot, up, front, under } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const { lit, unlit, lamp, foot, up, front } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
     const glow = glowOf(PLACE.copy(lamp!.value).sub(eye), way);
     const rise = way.dot(up!.value);
     const height = SIDE.copy(eye).sub(foot!.value).dot(up!.value);
@@ -132,7 +169,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       const place = PLACE.copy(way).multiplyScalar(-height / rise).add(eye).sub(foot!.value);
       wall = smoothstep(1.2, 5, place.length());
       puddle = FLOOR[1] * Math.exp(-place.lengthSq() / PUDDLE ** 2);
-      shade = 1 - this.shadowAt(place.add(foot!.value).sub(under!.value), up!.value, front!.value);
+      shade = 1 - this.shadowAt(place.add(foot!.value), up!.value, front!.value);
     }
     for (let channel = 0; channel < 3; channel++) {
       const light = lit!.value.getComponent(channel);
@@ -141,13 +178,20 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     }
   }
 
-  /** How dark the shadow is at a place of the floor, from the middle under the feet. */
+  /** How dark the shadow is at a place of the floor. */
   private shadowAt(place: THREE.Vector3, up: THREE.Vector3, front: THREE.Vector3): number {
-    const { shadow, depth } = this.material.uniforms as { shadow: { value: THREE.Vector2 }; depth: { value: number } };
-    const side = place.dot(SIDE.crossVectors(up, front)) / shadow.value.x;
-    const ahead = place.dot(front) / shadow.value.y;
-    const near = side * side + ahead * ahead;
-    return depth.value * (0.34 * Math.exp(-near) + 0.22 * Math.exp(-6 * near));
+    const { under, shadow, soles, sizes, depth } = this.uniforms;
+    const side = SIDE.crossVectors(up, front);
+    const from = (middle: THREE.Vector3, size: THREE.Vector2) => {
+      const away = AWAY.copy(place).sub(middle);
+      return (away.dot(side) / size.x) ** 2 + (away.dot(front) / size.y) ** 2;
+    };
+    const near = from(under.value, shadow.value);
+    let light = 1 - SHADES.far * Math.exp(-near) - SHADES.near * Math.exp(-6 * near);
+    for (const [i, size] of sizes.value.entries()) {
+      if (size.x > 0) light *= 1 - SHADES.sole * Math.exp(-(from(soles.value[i]!, size) ** 2));
+    }
+    return depth.value * (1 - light);
   }
 
   dispose(): void {
@@ -161,7 +205,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
   };
 }
 
-const [PLACE, SIDE, COLOUR] = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
+const [PLACE, AWAY, SIDE, COLOUR] = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
 
 /**
  * How much of the lamp's light is on the wall in a direction of length 1: half at `POOL` metres beside the lamp's
@@ -200,7 +244,8 @@ const number = (value: number) => value.toFixed(4); // as GLSL reads one
 // Colours are display values, as Gaussians are blended; noise of half a level hides the steps between them.
 const FRAGMENT = `
   uniform vec3 lit, unlit, lamp, foot, under, up, front;
-  uniform vec2 shadow;
+  uniform vec3 soles[2];
+  uniform vec2 shadow, sizes[2];
   uniform float depth, alone;
   varying vec3 ray;
 
@@ -209,6 +254,22 @@ const FRAGMENT = `
     float cosine = dot(way, toLamp) / distance;
     float beside = 4.0 * distance * distance * (1.0 - cosine) / (1.0001 + cosine);
     return 1.0 / (1.0 + beside / ${number(POOL ** 2)});
+  }
+
+  float from(vec3 place, vec3 middle, vec2 size) {
+    vec3 away = place - middle;
+    vec2 aside = vec2(dot(away, cross(up, front)), dot(away, front)) / size;
+    return dot(aside, aside);
+  }
+
+  float shadowAt(vec3 place) {
+    float near = from(place, under, shadow);
+    float light = 1.0 - ${number(SHADES.far)} * exp(-near) - ${number(SHADES.near)} * exp(-6.0 * near);
+    for (int i = 0; i < 2; i++) {
+      float pressed = from(place, soles[i], max(sizes[i], vec2(1e-4)));
+      if (sizes[i].x > 0.0) light *= 1.0 - ${number(SHADES.sole)} * exp(-pressed * pressed);
+    }
+    return depth * (1.0 - light);
   }
 
   void main() {
@@ -222,10 +283,7 @@ const FRAGMENT = `
       float puddle = ${number(FLOOR[1])} * exp(-dot(place, place) / ${number(PUDDLE ** 2)});
       vec3 ground = mix(${number(FLOOR[0])} * colour, lit, puddle);
       colour = mix(ground, colour, smoothstep(1.2, 5.0, length(place)));
-      vec3 away = place + foot - under;
-      vec2 aside = vec2(dot(away, cross(up, front)), dot(away, front)) / shadow;
-      float near = dot(aside, aside);
-      dark = depth * (0.34 * exp(-near) + 0.22 * exp(-6.0 * near));
+      dark = shadowAt(place + foot);
     }
     float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;
     gl_FragColor = alone > 0.5 ? vec4(vec3(0.0), dark) : vec4(colour * (1.0 - dark) + noise / 255.0, 1.0);

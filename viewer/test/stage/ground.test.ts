@@ -5,6 +5,7 @@ import { footprintOf, type Ground } from '../../src/stage/camera/ground.ts';
 const BLUR = 0.2; // m
 const WIDTH = 0.04; // m from the middle of a foot to where its sides count: a twentieth of all may be strays
 const DEPTH = 0.108; // m
+const EDGE = 0.025; // m
 const ground: Ground = { foot: new Vector3(1, 0.5, 2), up: new Vector3(0, 1, 0), toward: new Vector3(0, 0, 1) };
 
 /** Two feet of 0.24 × 0.1 m beside each other, `apart` m between their middles, and hands over them. */
@@ -38,4 +39,18 @@ test('it goes where they go, and turns with where somebody faces', () => {
 
 test('there is none under somebody who does not reach the floor', () => {
   expect(footprintOf(standing(0.2, new Vector3(0, 0.3, 0)), ground)).toBeNull();
+});
+
+test('each foot on the floor has a shadow of its own, and one in the air none', () => {
+  const { soles } = footprintOf(standing(0.3), ground)!;
+  expect(soles.map(({ middle }) => middle.x - ground.foot.x)).toEqual([expect.closeTo(-0.15, 3), expect.closeTo(0.15, 3)]);
+  for (const { size } of soles) {
+    expect(size[0]).toBeCloseTo(Math.hypot(0.045, EDGE), 2);
+    expect(size[1]).toBeCloseTo(Math.hypot(DEPTH, EDGE), 2);
+  }
+  const lifted = standing(0.3);
+  for (let at = 0; at < lifted.length; at += 3) if (lifted[at]! > ground.foot.x) lifted[at + 1]! += 0.08;
+  const [standingOn, ...others] = footprintOf(lifted, ground)!.soles;
+  expect(standingOn!.middle.x - ground.foot.x).toBeCloseTo(-0.15, 3);
+  expect(others).toEqual([]);
 });

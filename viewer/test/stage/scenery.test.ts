@@ -55,3 +55,25 @@ test('behind a head alone the colour is nearer to that on which it was trained',
   expect(away(false)).toBeLessThan(0.06);
   expect(away(true)).toBeGreaterThan(0.08);
 });
+
+test('the floor is darkest under each foot that stands on it', () => {
+  const scenery = new Scenery(GREY);
+  scenery.stand(GROUND, EYES);
+  scenery.setBright(true);
+  const above = new Vector3(0, 3, 0);
+  const light = (aside: number) => {
+    const out = new Float32Array(3);
+    scenery.colour(above, new Vector3(aside, 0, 0).sub(above).normalize(), out, 0);
+    return out[1]!;
+  };
+  const feet = (...places: [aside: number, height: number][]) =>
+    Float32Array.from(places.flatMap(([aside, height]) => [-0.04, 0, 0.04].flatMap((x) => [-0.12, 0, 0.12].flatMap((z) => [aside + x, height, z]))));
+  scenery.follow(feet([-0.15, 0.01], [0.15, 0.01]));
+  const [left, middle, right] = [-0.15, 0, 0.15].map(light) as [number, number, number];
+  expect(left).toBeCloseTo(right, 5);
+  expect(left).toBeLessThan(0.8 * middle);
+  const before = scenery.version;
+  scenery.follow(feet([-0.15, 0.01], [0.15, 0.08]));
+  expect(scenery.version).toBeGreaterThan(before);
+  expect(light(0.15)).toBeGreaterThan(1.2 * light(-0.15));
+});
