@@ -5,6 +5,7 @@ import time
 import tracemalloc
 
 import pytest
+from PIL import Image
 
 from ico3d.capture.importing.colmap import MOST_POINTS
 from ico3d.capture.importing.foreign import inside
@@ -52,3 +53,18 @@ def test_a_table_of_colmap_that_claims_much_is_not_kept(tmp_path):
         assert tracemalloc.get_traced_memory()[1] < 200 << 20
     finally:
         tracemalloc.stop()
+
+
+@pytest.mark.parametrize("key", ["file_path", "mask_path"])
+def test_a_picture_that_goes_on_as_a_hole_is_not_copied(tmp_path, key):
+    names = ["a.png", "b.png", "c.png"]
+    foreign_models.write_pictures(tmp_path, names)
+    Image.new("L", (40, 32), 255).save(tmp_path / "mask.png")
+    entries = foreign_models.frames(foreign_models.poses(3), names)
+    entries[1]["mask_path"] = "mask.png"
+    foreign_models.write_transforms(tmp_path, entries)
+    with (tmp_path / entries[1][key]).open("r+b") as file:
+        file.truncate(1 << 33)
+    with pytest.raises(CaptureError, match="more bytes than a picture of 40 × 32"):
+        import_recording(tmp_path, tmp_path / "out", ImportSettings())
+    assert not (tmp_path / "out").exists()

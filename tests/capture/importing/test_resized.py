@@ -7,6 +7,11 @@ from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.cli import main
 from ico3d.errors import SettingsError
+from ico3d.rig import body_track
+from ico3d.rig.binding import Binding
+from ico3d.rig.body_track import BodyTrack
+from ico3d.rig.quaternions import from_rotvec
+from ico3d.rig.rig import Rig
 from support.recordings import multiview_folders
 
 
@@ -92,3 +97,40 @@ def test_the_command_writes_a_smaller_capture(two_sizes, tmp_path, capsys):
     np.testing.assert_array_equal(small.world_points(0), expected.world_points(0))
     assert main(["capture", "resize", str(two_sizes), str(out)]) == 1
     assert "exists already" in capsys.readouterr().err
+
+
+def _track(whole) -> BodyTrack:
+    """Of somebody with two joints."""
+    random, frames = np.random.default_rng(0), whole.num_frames
+    return BodyTrack(
+        rig=Rig(("root", "arm"), (-1, 0), np.array([[0, 1, 0], [0.2, 1, 0.0]])),
+        fps=whole.fps,
+        rotations=from_rotvec(random.normal(size=(frames, 2, 3))).astype(np.float32),
+        roots=random.normal(size=(frames, 3)).astype(np.float32),
+        fitted=np.ones(frames, bool),
+        vertices=random.normal(size=(4, 3)).astype(np.float32),
+        faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        binding=Binding.strongest(random.random((4, 2))),
+        source="made for a test",
+    )
+
+
+def test_tracks_are_written_anew_and_what_is_none_is_refused(two_sizes, tmp_path, capsys):
+    """A link in somebody's folder would hand on the file that it names, a hole fill the disk."""
+    whole, track = open_capture(two_sizes), two_sizes / body_track.NAME
+    own = _track(whole)
+    (tmp_path / "elsewhere").write_bytes(own.to_bytes())
+    track.symlink_to(tmp_path / "elsewhere")
+    resize = ["capture", "resize", str(two_sizes), "--height", "32"]
+    assert main([*resize[:3], str(tmp_path / "small"), *resize[3:]]) == 0
+    copied = tmp_path / "small" / body_track.NAME
+    assert not copied.is_symlink()
+    np.testing.assert_array_equal(open_capture(copied.parent).body_track().roots, own.roots)
+    (tmp_path / "elsewhere").write_text("SECRET")
+    assert main([*resize[:3], str(tmp_path / "secret"), *resize[3:]]) == 1
+    assert "is damaged" in capsys.readouterr().err and not (tmp_path / "secret").exists()
+    track.unlink()
+    with track.open("wb") as file:
+        file.truncate(1 << 33)
+    assert main([*resize[:3], str(tmp_path / "hole"), *resize[3:]]) == 1
+    assert "has more than" in capsys.readouterr().err and not (tmp_path / "hole").exists()

@@ -117,6 +117,30 @@ async def test_events_are_utf_8_whatever_their_type_says(answered, coding):
     assert await answered(hidden * 100, f"text/event-stream; charset={coding}") == []
 
 
+@pytest.mark.parametrize("method", ["GET", "POST"])
+@pytest.mark.parametrize("status", [307, 404, 500])
+async def test_what_is_no_success_is_no_stream_of_events(monkeypatch, method, status):
+    """A redirect's body is kept whole by who follows it, however long it goes on."""
+    from ico3d.chat.services.bounded import EVENTS
+    from ico3d.chat.tools import bounded_http
+
+    monkeypatch.setattr(bounded_http, "MESSAGE", Limits(1000, 10))
+
+    async def sent():
+        for _ in range(100):
+            yield b":" * 100
+
+    async def answer(self, request):
+        headers = {"Content-Type": EVENTS, "Location": "/again"}
+        return httpx2.Response(status, headers=headers, content=sent())
+
+    monkeypatch.setattr(httpx2.AsyncHTTPTransport, "handle_async_request", answer)
+    transport = bounded_http.BoundedTransport(2.0, trust_env=False)
+    async with httpx2.AsyncClient(transport=transport, follow_redirects=True) as client:
+        with pytest.raises(httpx2.ReadError, match="too large"):
+            await client.request(method, "http://127.0.0.1/")
+
+
 def _hasty(is_resumed):
     """An MCP server whose streams end at once and are to be opened again at once, without end.
 
@@ -170,8 +194,11 @@ async def test_streams_are_not_opened_again_without_a_pause(monkeypatch, is_resu
     async with running(app) as port:
         connection = Connection(McpServer("m", url=f"http://127.0.0.1:{port}/mcp", seconds=2))
         asked = asyncio.create_task(connection.functions())
+        async with asyncio.timeout(60):  # the first of a process imports the SDK
+            while methods.count("GET") < 3:
+                await asyncio.sleep(0.05)
         await asyncio.sleep(2.5)
-        assert 3 <= methods.count("GET") <= 3 + 4
+        assert methods.count("GET") <= 3 + 4
         if is_resumed:
             with pytest.raises(TimeoutError):
                 await asked

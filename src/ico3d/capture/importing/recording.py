@@ -14,6 +14,7 @@ from ico3d.capture.importing.colmap import is_model, read_colmap
 from ico3d.capture.importing.foreign import Foreign, Shot
 from ico3d.capture.importing.settings import ImportSettings
 from ico3d.capture.importing.transforms import read_transforms
+from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.capture.multiview.writing import shown
@@ -22,6 +23,8 @@ from ico3d.capture.vetting.claims import MOST_GAPS
 from ico3d.capture.writing.new_folder import new_folder
 from ico3d.errors import CaptureError
 
+PIXEL, BESIDE_PIXELS = 16, 4 << 20
+"""Most bytes of a picture's file: of each pixel, and of previews and profiles beside them."""
 NEARLY = np.cos(np.radians(20))
 """Cosine of the angle (20°) up to which an axis of the source counts as the upward direction."""
 UNEVEN = 0.1
@@ -186,8 +189,23 @@ def _copy(
                         suffix = file.suffix.lower()
                         target = work / kind / place.lens.name / f"{frame:06d}{suffix}"
                         target.parent.mkdir(parents=True, exist_ok=True)
+                        _check_size(file, place.lens)
                         _place(file, target, copies)
                 advance()
+
+
+def _check_size(file: Path, lens: Lens) -> None:
+    """Refuses a file with more bytes than its pixels can have: a hole becomes as long on the disk.
+
+    Raises:
+        CaptureError: If it has.
+    """
+    most = BESIDE_PIXELS + PIXEL * lens.width * lens.height
+    if file.stat().st_size > most:
+        raise CaptureError(
+            f"{file} has more bytes than a picture of {lens.width} × {lens.height} pixels needs "
+            f"(at most {most >> 20} MiB)."
+        )
 
 
 def _place(file: Path, target: Path, copies: dict[Path, Path]) -> None:

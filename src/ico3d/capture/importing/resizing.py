@@ -1,14 +1,12 @@
 """Writes any capture again with smaller pictures, as a multiview folder."""
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.formats import open_capture, opened_apart
-from ico3d.capture.headpose.track_file import NAME as TRACK
-from ico3d.capture.headpose.track_file import track_file
+from ico3d.capture.headpose.track_file import read_track
 from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
@@ -16,7 +14,7 @@ from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.portrait.files import save_picture
 from ico3d.capture.writing.new_folder import new_folder
 from ico3d.common.camera import Camera
-from ico3d.rig import body_track
+from ico3d.rig.body_track import write_body_track
 
 
 def resize_capture(source: Path, out: Path, height: int, workers: int) -> Description:
@@ -93,10 +91,7 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     sound = capture.audio()
     if sound is not None:
         soundfile.write(work / "audio.wav", sound.samples, sound.rate)
-    tracks = {TRACK: track_file(capture.path), body_track.NAME: body_track.track_file(capture.path)}
-    for name, track in tracks.items():
-        if track.is_file():
-            shutil.copyfile(track, work / name)  # in metres, whatever the size of the pictures
+    _write_tracks(capture, work)
     if capture.shows == "head":
         return  # a head: its points lie in its own head space, tracking will find another
     for frame in range(capture.num_frames):
@@ -104,3 +99,16 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
         if points is not None:
             (work / "points").mkdir(exist_ok=True)
             np.save(work / "points" / f"{frame:06d}.npy", points.astype(np.float32))
+
+
+def _write_tracks(capture: ResizedCapture, work: Path) -> None:
+    """Writes head and body tracks, which are in metres, whatever the size of the pictures.
+
+    They are read and written anew: a file in somebody's folder may be a hole, or a link to another.
+    """
+    head = read_track(capture.path, capture.num_frames, len(capture.cameras))
+    if head is not None:
+        head.write(work)
+    body = capture.body_track()
+    if body is not None:
+        write_body_track(body, work)

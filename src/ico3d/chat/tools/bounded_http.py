@@ -40,6 +40,7 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
     """Reads no more of an answer than `MESSAGE`, and none that is compressed.
 
     A stream of events may go on for long: each is a message, and no more than `LINE_RATE` come.
+    What is no success is none, whatever its type says: the SDK keeps a redirect's body whole.
     What opens streams anew waits if that is too soon; calls, which are sent by POST, do not. What
     ends a session is answered within `ENDING`, or not at all.
     """
@@ -76,7 +77,7 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
         response = await super().handle_async_request(request)
         await ensure_plain(response)
         stream = response.stream
-        if is_events(response):
+        if response.is_success and is_events(response):
             response.stream = _Paced(stream, self._lines, self._bytes)
         else:
             response.stream = Whole(stream, MESSAGE)

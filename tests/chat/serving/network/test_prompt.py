@@ -180,6 +180,31 @@ async def test_headers_behind_a_body_are_bounded_too(unread, trailer):
         assert await closed < 2
 
 
+@pytest.mark.parametrize("path", [b"/health", b"/length"], ids=["answered at once", "read"])
+async def test_a_body_in_crumbs_is_cut_off_whether_it_is_read_or_not(port, unread, path):
+    own, _ = unread
+    async with connected(port if path == b"/health" else own) as (reader, writer):
+        writer.write(b"POST " + path + HOST + b"Transfer-Encoding: chunked\r\n\r\n")
+        closed = asyncio.create_task(seconds_until_closed(reader))
+        with contextlib.suppress(ConnectionError):
+            for _ in range(20):
+                writer.write(b"1\r\nx\r\n" * 50)
+                await writer.drain()
+                await asyncio.sleep(0.01)
+        assert await closed < 2
+
+
+@pytest.mark.parametrize(("size", "count"), [(1, prompt.PIECES), (2 * prompt.SMALL, 600)])
+async def test_some_small_pieces_or_many_of_good_size_are_no_crumbs(unread, size, count):
+    port, _ = unread
+    async with connected(port) as (reader, writer):
+        writer.write(b"POST /length" + HOST + b"Transfer-Encoding: chunked\r\n\r\n")
+        writer.write(b"%x\r\n%s\r\n" % (size, bytes(size)) * count + b"0\r\n\r\n")
+        assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+        total = b"%d" % (size * count)
+        assert await reader.readexactly(len(total)) == total
+
+
 @pytest.mark.parametrize("coding", ["chunks", "a length"])
 async def test_a_long_body_is_no_head(unread, coding):
     port, _ = unread

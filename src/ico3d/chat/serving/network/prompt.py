@@ -18,6 +18,9 @@ from ico3d.errors import ProtocolError
 HEAD = 10.0  # s for the head of a request
 LARGEST_HEAD = 1 << 16  # bytes
 MOST_HEADERS = 200  # of a request, those behind its body included
+PIECES, SMALL = 200, 512
+"""Pieces of a request's body after which they must have so many bytes on average: each costs this
+process time, however small it is, and a chunk of one byte is a piece."""
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 DESCRIPTORS = 1 << 16  # that a server asks the system for
 UNREAD = b"cookie"
@@ -28,6 +31,8 @@ _open: Counter[str] = Counter()
 
 class PromptProtocol(HttpToolsProtocol):
     """HTTP on one connection, which is closed if a request's head takes too long or is too large.
+
+    So it is if a body comes in crumbs.
 
     Behind a request that is not answered yet, one more may wait: a client may be that quick. One
     machine may have so many connections open and no more. Those of proxies that the operator
@@ -95,13 +100,22 @@ class PromptProtocol(HttpToolsProtocol):
         self._within_head = False
         self._stop_waiting()
         self._head_bytes = 0
+        self._pieces = self._body_bytes = 0
         before = self.cycle
         super().on_headers_complete()
         self._first = before if self.pipeline else self.cycle
 
     def on_body(self, body: bytes) -> None:
-        """A piece of a request's body has arrived."""
+        """A piece of a request's body has arrived, whether the request is answered or not.
+
+        Raises:
+            ProtocolError: If the body comes in too many small ones; the connection is closed.
+        """
         self._head_bytes = 0
+        self._pieces += 1
+        self._body_bytes += len(body)
+        if self._pieces > PIECES and self._body_bytes < SMALL * self._pieces:
+            self._cut_off("a body in crumbs.")
         super().on_body(body)
 
     def on_message_complete(self) -> None:
