@@ -51,6 +51,22 @@ describe('a body on a skeleton that Python baked', () => {
     expect(Math.max(...residual.map(Math.abs))).toBeGreaterThan(0.1);
   });
 
+  test('is outlined by its joints and its lowest Gaussians, which move with the joint that carries each', () => {
+    const generator = new SkinnedGenerator(baked);
+    const joints = info.names.length;
+    const rest = { ...skeleton.empty(), rotations: Float64Array.from({ length: 4 * joints }, (_, i) => (i % 4 === 0 ? 1 : 0)), root: new Float64Array(3) };
+    generator.pose(rest);
+    const places = generator.places();
+    expect(off(places, [...baked.poses.joints])).toBeLessThan(1e-6);
+    const soles = Array.from({ length: places.length / 3 - joints }, (_, i) => [...places.slice(3 * (joints + i), 3 * (joints + i) + 3)]);
+    const heights = Array.from({ length: baked.count }, (_, i) => baked.means[3 * i + 1]!);
+    const floor = Math.min(...heights);
+    expect(soles).toHaveLength(heights.filter((height) => height < floor + 0.03).length);
+    expect(Math.min(...soles.map(([, height]) => height!))).toBeCloseTo(floor, 6);
+    generator.pose({ ...rest, root: Float64Array.of(0.5, -1, 2) });
+    expect(off(generator.places(), [...places].map((value, i) => value + [0.5, -1, 2][i % 3]!))).toBeLessThan(1e-5);
+  });
+
   test('moves its joints as in Python', () => {
     const table = new Float32Array(16 * info.names.length);
     for (const { rotations, root, residual, table: expected } of reference.moments) {

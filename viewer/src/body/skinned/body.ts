@@ -42,7 +42,7 @@ export class SkinnedBody implements Actor {
     return true;
   }
 
-  /** Positions (J,3) of the joints. */
+  /** Positions (P,3) of joints and soles. */
   get points(): Float32Array {
     return (this.joints ??= this.generator.places());
   }

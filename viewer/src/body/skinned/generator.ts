@@ -1,5 +1,6 @@
 import { GrowingGenerator } from '../../gaussians/growing.ts';
 import type { BakedSkinned, SkinnedRows } from './baked.ts';
+import type { Vector } from '../../rig/quaternions.ts';
 import { ShadowMap } from './shadow.ts';
 import { placesOf, Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
 import { SoftSkinned } from './soft.ts';
@@ -18,6 +19,7 @@ export class SkinnedGenerator extends GrowingGenerator {
   readonly map: ShadowMap | null;
   /** Gaussians that are drawn at most. */
   most: number;
+  private readonly outline: { points: Vector[]; carriers: number[] };
   readonly soft: SoftSkinned;
 
   constructor(baked: BakedSkinned) {
@@ -28,6 +30,11 @@ export class SkinnedGenerator extends GrowingGenerator {
     this.most = info.num_gaussians;
     this.skeleton = new Skeleton(info, baked.poses);
     this.table = new Float32Array(TABLE_ROW * info.names.length);
+    const soles = solesOf(baked);
+    this.outline = {
+      points: [...this.skeleton.rig.joints, ...soles.points],
+      carriers: [...this.skeleton.rig.joints.keys(), ...soles.carriers],
+    };
     this.map = lamp && new ShadowMap(lamp, info.names.length);
     this.soft = new SoftSkinned(this);
   }
@@ -40,9 +47,9 @@ export class SkinnedGenerator extends GrowingGenerator {
     this.changed();
   }
 
-  /** Positions (J,3) of the joints in the pose that is shown, m. */
+  /** Positions (P,3) of joints and soles in the pose that is shown, m. */
   places(): Float32Array {
-    return placesOf(this.skeleton.rig.joints, this.table);
+    return placesOf(this.outline.points, this.outline.carriers, this.table);
   }
 
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
@@ -56,4 +63,20 @@ export class SkinnedGenerator extends GrowingGenerator {
     this.most = Math.min(count, this.numSplats);
     this.changed();
   }
+}
+
+const SOLE = 0.03; // m over the lowest of a body at rest
+const ENOUGH = 200; // Gaussians that tell where soles are
+
+/** The lowest Gaussians of a body at rest, and the joint that carries each most. */
+function solesOf({ means, joints, weights, count }: SkinnedRows): { points: Vector[]; carriers: number[] } {
+  const heights = Array.from({ length: count }, (_, i) => means[3 * i + 1]!);
+  const floor = heights.reduce((lowest, height) => Math.min(lowest, height), Infinity);
+  const low = [...heights.keys()].filter((i) => heights[i]! < floor + SOLE);
+  const some = low.filter((_, k) => k % Math.ceil(low.length / ENOUGH) === 0);
+  const carrier = (i: number) => {
+    const share = weights.subarray(4 * i, 4 * i + 4);
+    return joints[4 * i + share.indexOf(Math.max(...share))]!;
+  };
+  return { points: some.map((i) => [means[3 * i]!, means[3 * i + 1]!, means[3 * i + 2]!]), carriers: some.map(carrier) };
 }

@@ -81,12 +81,12 @@ export class Skeleton {
   }
 }
 
-/** Where joints at rest are moved by a table of `Skeleton`: (J,3) positions, m. */
-export function placesOf(rest: readonly Vector[], table: Float32Array): Float32Array {
+/** Where points at rest (P,3) are moved by a table of `Skeleton`, each by the joint that carries it: (P,3) positions, m. */
+export function placesOf(rest: readonly Vector[], carriers: readonly number[], table: Float32Array): Float32Array {
   return Float32Array.from({ length: 3 * rest.length }, (_, i) => {
-    const [joint, axis] = [Math.floor(i / 3), i % 3];
-    const [x, y, z] = rest[joint]!;
-    const row = TABLE_ROW * joint + 4 * axis;
+    const [point, axis] = [Math.floor(i / 3), i % 3];
+    const [x, y, z] = rest[point]!;
+    const row = TABLE_ROW * carriers[point]! + 4 * axis;
     return table[row]! * x + table[row + 1]! * y + table[row + 2]! * z + table[row + 3]!;
   });
 }
