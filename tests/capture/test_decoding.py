@@ -15,6 +15,7 @@ from PIL import EpsImagePlugin, Image, ImageFile
 import ico3d
 from ico3d.capture.decoding import MOST_SIDE, decoded, has_opacity, open_picture, size_of
 from ico3d.capture.formats import open_capture
+from ico3d.capture.vetting import chunks
 from ico3d.errors import CaptureError
 from ico3d.measure.comparison import pictures_of
 
@@ -129,3 +130,32 @@ def test_nothing_waits_for_a_pipe(tmp_path):
     os.mkfifo(tmp_path / "a.jpg")
     with pytest.raises(CaptureError, match="cannot be decoded"):
         size_of(tmp_path / "a.jpg", "picture")
+
+
+@pytest.mark.parametrize("where", ["before", "behind"])
+@pytest.mark.parametrize("kept", ["bytes", "a file"])
+def test_what_a_picture_has_beside_its_pixels_is_bounded(tmp_path, monkeypatch, where, kept):
+    """Pillow reads each chunk whole: a hole of gigabytes became as much memory."""
+    monkeypatch.setattr(chunks, "BESIDE", 1000)
+    content = io.BytesIO()
+    Image.new("RGB", (40, 30), "teal").save(content, "PNG")
+    picture = content.getvalue()
+    at = 33 if where == "before" else len(picture) - 12
+
+    def padded(size):
+        chunk = b"prVt" + bytes(size)
+        chunk = struct.pack(">I", size) + chunk + struct.pack(">I", zlib.crc32(chunk))
+        data = picture[:at] + chunk + picture[at:]
+        (tmp_path / "a.png").write_bytes(data)
+        return data if kept == "bytes" else tmp_path / "a.png"
+
+    assert decoded(padded(900), "it").shape == (30, 40, 3)
+    with pytest.raises(CaptureError, match="more beside its pixels than cameras make"):
+        decoded(padded(1100), "it")
+
+
+def test_chunks_have_an_end(monkeypatch):
+    monkeypatch.setattr(chunks, "MOST_CHUNKS", 50)
+    empty = struct.pack(">I", 0) + b"IDAT" + struct.pack(">I", zlib.crc32(b"IDAT"))
+    assert chunks.has_large_chunks(io.BytesIO(chunks.SIGNATURE + empty * 60))
+    assert not chunks.has_large_chunks(io.BytesIO(chunks.SIGNATURE + empty * 40))

@@ -51,6 +51,12 @@ def test_two_kilobytes_are_no_half_hour(tmp_path, rate):
     refused(lambda: read_sound_file(path), f"claims {rate} samples per second")
 
 
+def test_raw_sound_is_refused_in_a_sentence(tmp_path):
+    path = tmp_path / "a.raw"
+    path.write_bytes(bytes(2000))
+    refused(lambda: read_sound_file(path), "cannot be read")
+
+
 def test_a_flac_file_that_claims_days_is_not_decoded(tmp_path):
     path = tmp_path / "a.flac"
     soundfile.write(path, np.zeros(4000), 16_000)

@@ -36,6 +36,10 @@ def test_transcripts_come_from_the_readmes_table(tmp_path):
         transcripts(tmp_path)
     (tmp_path / "a.wav").touch()
     assert transcripts(tmp_path) == {tmp_path / "a.wav": "Ask not."}
+    with readme.open("r+b") as file:
+        file.truncate(1 << 33)
+    with pytest.raises(SettingsError, match=r"no README\.md"):  # none that is read whole
+        transcripts(tmp_path)
 
 
 def test_words_that_nobody_knows_cannot_be_aligned():

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from ico3d.capture.vetting.chunks import has_large_chunks
 from ico3d.capture.vetting.scans import has_many_scans
 from ico3d.common.files import check_regular
 from ico3d.errors import CaptureError
@@ -77,13 +78,15 @@ def open_picture(
         The picture, to be closed by the caller.
 
     Raises:
-        CaptureError: If it is larger than is taken, or has more passes (`has_many_scans`).
+        CaptureError: If it is larger than is taken, or has more passes (`has_many_scans`), or more
+            beside its pixels (`has_large_chunks`).
         OSError: If it is missing, damaged, no regular file or of another kind; others of `DAMAGED`
             too.
     """
     if isinstance(source, Path):
         check_regular(source)
     stream = io.BytesIO(source) if isinstance(source, bytes) else source
+    _check_beside(source, what)
     try:
         picture = Image.open(stream, formats=formats)
     except Image.DecompressionBombError as error:
@@ -95,6 +98,13 @@ def open_picture(
         picture.close()
         raise
     return picture
+
+
+def _check_beside(source: Path | bytes, what: str) -> None:
+    """Refuses a PNG picture with much beside its pixels, all of which would be kept."""
+    with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
+        if has_large_chunks(file):
+            raise CaptureError(f"{what}: the picture has more beside its pixels than cameras make.")
 
 
 def _check_scans(source: Path | bytes, what: str) -> None:

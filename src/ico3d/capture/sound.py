@@ -35,7 +35,7 @@ def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
             blocks = file.blocks(BLOCK, dtype="float32", always_2d=True)  # (≤ BLOCK, channels) each
             pieces = (block.mean(1) for block in blocks)
             return Sound(joined(pieces, file.samplerate, wanted), wanted)
-    except (OSError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError, TypeError, RuntimeError) as error:  # TypeError: raw sound
         raise CaptureError(f"{path} cannot be read: {error}.") from error
 
 

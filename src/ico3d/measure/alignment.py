@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.common.espeak.speech import Phoneme
+from ico3d.common.files import read_small
 from ico3d.errors import MissingExtraError, SettingsError
 
 _IPA = (
@@ -28,8 +29,8 @@ def transcripts(folder: Path) -> dict[Path, str]:
         SettingsError: If there is no such table, or a file of the table is missing.
     """
     try:
-        lines = (folder / "README.md").read_text("utf-8").splitlines()
-    except OSError:
+        lines = read_small(folder / "README.md").decode("utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
         raise SettingsError(f"{folder} has no README.md that says what is said.") from None
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if "|" in line]
     head = next((row for row in rows if "words" in row), None)

@@ -11,6 +11,7 @@ from ico3d.capture.importing.colmap import MOST_POINTS
 from ico3d.capture.importing.foreign import inside
 from ico3d.capture.importing.recording import import_recording
 from ico3d.capture.importing.settings import ImportSettings
+from ico3d.capture.writing import new_folder
 from ico3d.common.unpacking import memory
 from ico3d.errors import CaptureError
 from support.recordings import foreign_models
@@ -65,6 +66,19 @@ def test_a_picture_that_goes_on_as_a_hole_is_not_copied(tmp_path, key):
     foreign_models.write_transforms(tmp_path, entries)
     with (tmp_path / entries[1][key]).open("r+b") as file:
         file.truncate(1 << 33)
-    with pytest.raises(CaptureError, match="more bytes than a picture of 40 × 32"):
+    with pytest.raises(CaptureError, match="has holes, which no picture has"):
+        import_recording(tmp_path, tmp_path / "out", ImportSettings())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_that_does_not_fit_is_refused_before_it_is_copied(tmp_path, monkeypatch):
+    foreign_models.write_pictures(tmp_path, ["a.png"])
+    foreign_models.write_transforms(
+        tmp_path, foreign_models.frames(foreign_models.poses(1), ["a.png"])
+    )
+    usage = new_folder.shutil.disk_usage(tmp_path)
+    full = usage._replace(free=new_folder.SPARE)
+    monkeypatch.setattr(new_folder.shutil, "disk_usage", lambda _: full)
+    with pytest.raises(CaptureError, match=r"which has 0\.3 GB left"):
         import_recording(tmp_path, tmp_path / "out", ImportSettings())
     assert not (tmp_path / "out").exists()

@@ -5,6 +5,7 @@ import pytest
 
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
+from ico3d.capture.writing import new_folder
 from ico3d.cli import main
 from ico3d.errors import SettingsError
 from ico3d.rig import body_track
@@ -134,3 +135,15 @@ def test_tracks_are_written_anew_and_what_is_none_is_refused(two_sizes, tmp_path
         file.truncate(1 << 33)
     assert main([*resize[:3], str(tmp_path / "hole"), *resize[3:]]) == 1
     assert "has more than" in capsys.readouterr().err and not (tmp_path / "hole").exists()
+
+
+def test_points_are_not_written_where_the_disk_is_nearly_full(
+    two_sizes, tmp_path, monkeypatch, capsys
+):
+    """Links to one hole of halves become gigabytes of numbers."""
+    usage = new_folder.shutil.disk_usage(tmp_path)
+    full = usage._replace(free=new_folder.SPARE + 47)  # four points have 48 bytes
+    monkeypatch.setattr(new_folder.shutil, "disk_usage", lambda _: full)
+    out = tmp_path / "small"
+    assert main(["capture", "resize", str(two_sizes), str(out), "--height", "32"]) == 1
+    assert "GB left: make room" in capsys.readouterr().err and not out.exists()

@@ -15,6 +15,7 @@ pytestmark = [
 
 from ico3d.bundle.format import Bundle  # noqa: E402
 from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice  # noqa: E402
+from ico3d.bundle.people.voice import VOICE  # noqa: E402
 from ico3d.cli import main  # noqa: E402
 from ico3d.creating.events import Voiced  # noqa: E402
 from ico3d.creating.looking.advice import Advice  # noqa: E402
@@ -22,6 +23,7 @@ from ico3d.creating.settings import CreateSettings  # noqa: E402
 from ico3d.creating.voice import clone as room  # noqa: E402
 from ico3d.creating.voice.clone import awaits_voice, clone  # noqa: E402
 from ico3d.creating.workplace import workplace  # noqa: E402
+from ico3d.errors import BundleError  # noqa: E402
 
 AGREED = "I agree that it speaks with my voice."
 
@@ -88,6 +90,14 @@ def test_a_voice_is_cloned_once(settings, fake):
     again, same, _ = cloned(settings)
     assert again is not None and (again.tone == found.tone).all() and same == [told]
     assert fake.ToneColorConverter.made == [converter] and converter.extracted == 1
+
+
+def test_a_kept_voice_that_is_a_hole_is_not_read(settings, fake):
+    cloned(settings)
+    with workplace(settings) as place, place.voice_file(VOICE).open("r+b") as file:
+        file.truncate(1 << 33)
+    with pytest.raises(BundleError, match="is no voice: delete it"):
+        cloned(settings)
 
 
 @pytest.mark.parametrize("consent", ["", " ", "not stated"])

@@ -9,7 +9,7 @@ import tyro
 
 from ico3d.avatar.baking.telling.statement import Statement
 from ico3d.common.device import DeviceName
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -235,7 +235,7 @@ class Bake:
 
     def _notices(self) -> str:
         try:
-            return "\n\n".join(path.read_text("utf-8").strip() for path in self.licences)
+            return "\n\n".join(read_small(path).decode("utf-8").strip() for path in self.licences)
         except (OSError, UnicodeDecodeError) as error:
             self._refuse(f"a notice of --licences cannot be read: {error}.")
 

@@ -14,17 +14,14 @@ from ico3d.capture.importing.colmap import is_model, read_colmap
 from ico3d.capture.importing.foreign import Foreign, Shot
 from ico3d.capture.importing.settings import ImportSettings
 from ico3d.capture.importing.transforms import read_transforms
-from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.capture.multiview.writing import shown
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.capture.vetting.claims import MOST_GAPS
-from ico3d.capture.writing.new_folder import new_folder
+from ico3d.capture.writing.new_folder import check_room, new_folder
 from ico3d.errors import CaptureError
 
-PIXEL, BESIDE_PIXELS = 16, 4 << 20
-"""Most bytes of a picture's file: of each pixel, and of previews and profiles beside them."""
 NEARLY = np.cos(np.radians(20))
 """Cosine of the angle (20°) up to which an axis of the source counts as the upward direction."""
 UNEVEN = 0.1
@@ -181,6 +178,7 @@ def _copy(
 ) -> None:
     """Copies pictures and masks as they are."""
     copies: dict[Path, Path] = {}
+    check_room(work, sum(_size(file) for file in _files(cameras)))
     with shown("copying", sum(map(len, cameras))) as advance:
         for place, shots, numbers in zip(places, cameras, frames, strict=True):
             for shot, frame in zip(shots, numbers, strict=True):
@@ -189,23 +187,27 @@ def _copy(
                         suffix = file.suffix.lower()
                         target = work / kind / place.lens.name / f"{frame:06d}{suffix}"
                         target.parent.mkdir(parents=True, exist_ok=True)
-                        _check_size(file, place.lens)
                         _place(file, target, copies)
                 advance()
 
 
-def _check_size(file: Path, lens: Lens) -> None:
-    """Refuses a file with more bytes than its pixels can have: a hole becomes as long on the disk.
+def _files(cameras: list[list[Shot]]) -> set[Path]:
+    """Pictures and masks, each once."""
+    shots = [shot for row in cameras for shot in row]
+    return {shot.file for shot in shots} | {shot.mask for shot in shots if shot.mask is not None}
+
+
+def _size(file: Path) -> int:
+    """Bytes of a file, which its copy has, too.
 
     Raises:
-        CaptureError: If it has.
+        CaptureError: If it has a hole, in which a disk keeps nothing; no picture has any.
     """
-    most = BESIDE_PIXELS + PIXEL * lens.width * lens.height
-    if file.stat().st_size > most:
-        raise CaptureError(
-            f"{file} has more bytes than a picture of {lens.width} × {lens.height} pixels needs "
-            f"(at most {most >> 20} MiB)."
-        )
+    with file.open("rb") as opened:
+        size = os.fstat(opened.fileno()).st_size
+        if size and os.lseek(opened.fileno(), 0, os.SEEK_HOLE) < size:
+            raise CaptureError(f"{file} has holes, which no picture has.")
+    return size
 
 
 def _place(file: Path, target: Path, copies: dict[Path, Path]) -> None:

@@ -12,7 +12,7 @@ from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.portrait.files import save_picture
-from ico3d.capture.writing.new_folder import new_folder
+from ico3d.capture.writing.new_folder import check_room, new_folder
 from ico3d.common.camera import Camera
 from ico3d.rig.body_track import write_body_track
 
@@ -97,6 +97,7 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     for frame in range(capture.num_frames):
         points = capture.world_points(frame)
         if points is not None:
+            check_room(work, points.size * np.dtype(np.float32).itemsize)
             (work / "points").mkdir(exist_ok=True)
             np.save(work / "points" / f"{frame:06d}.npy", points.astype(np.float32))
 

@@ -14,6 +14,8 @@ from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import NOT_STATED
 from ico3d.errors import CaptureError
 
+SPARE = 1 << 28
+"""Bytes of a disk that a folder of a recording leaves free."""
 UNFINISHED = "unfinished.json"
 """File of an unfinished folder that says of whom it is, from the first picture on."""
 _HIDDEN = re.compile(r"\..+\.[0-9a-f]{8}", re.DOTALL)
@@ -55,6 +57,24 @@ def new_folder(
     finally:
         shutil.rmtree(work, ignore_errors=True)
         os.close(lock)
+
+
+def check_room(folder: Path, size: int) -> None:
+    """Checks that a disk has room for what a stranger's files become, and some more.
+
+    Args:
+        folder: A folder on the disk.
+        size: Bytes that are about to be written.
+
+    Raises:
+        CaptureError: If it has not.
+    """
+    free = shutil.disk_usage(folder).free
+    if size + SPARE > free:
+        raise CaptureError(
+            f"{size / 1e9:.1f} GB are to be written to {folder.parent}, which has "
+            f"{free / 1e9:.1f} GB left: make room, or name another folder."
+        )
 
 
 def _begun(out: Path) -> tuple[Path, int]:

@@ -11,7 +11,7 @@ import numpy as np
 from ico3d.bundle.people.provenance import OPENVOICE, ClonedVoice
 from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
 from ico3d.capture.video import read_sound
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.people.stated import is_stated
 from ico3d.common.sound import wav_bytes
 from ico3d.creating.events import Tell, Voiced
@@ -22,6 +22,8 @@ from ico3d.errors import BundleError, MissingModelError, SettingsError
 
 RATE = 22_050
 """Samples per second that OpenVoice listens to."""
+MOST_VOICE = 1 << 16
+"""Bytes of a voice's file, which has 256 numbers."""
 LATER = " The same command clones the voice once that is mended."
 
 
@@ -68,7 +70,11 @@ def clone(settings: CreateSettings, place: Workplace, tell: Tell) -> Cloned | No
     if known["fault"]:
         return _without(Advice(**known["fault"]), tell)
     tell(Voiced(known["seconds"]))
-    return Cloned(voice_from_bytes(place.voice_file(VOICE).read_bytes()), about)
+    file = place.voice_file(VOICE)
+    try:
+        return Cloned(voice_from_bytes(read_small(file, most=MOST_VOICE)), about)
+    except OSError as error:
+        raise BundleError(f"{file} is no voice: delete it and run the same command.") from error
 
 
 def awaits_voice(settings: CreateSettings, place: Workplace) -> bool:

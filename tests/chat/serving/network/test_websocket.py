@@ -169,6 +169,48 @@ async def test_a_closed_connection_does_not_wait_for_who_does_not_read(served, m
                 await asyncio.sleep(0.01)
 
 
+@pytest.mark.parametrize("late", [frame(Opcode.TEXT), frame(Opcode.BINARY, b"x")])
+async def test_who_goes_on_behind_the_last_word_is_not_heard(served, monkeypatch, late):
+    """Nothing takes messages then, so that nothing paused their parsing."""
+    monkeypatch.setattr(websocket, "LAST_WORDS", 60.0)
+    parsed = []
+    monkeypatch.setattr(
+        websocket.BoundedWebSocket, "handle_text", lambda _, event: parsed.append(event)
+    )
+    monkeypatch.setattr(
+        websocket.BoundedWebSocket, "handle_bytes", lambda _, event: parsed.append(event)
+    )
+
+    async def page(socket):
+        await socket.close(1013, "enough")
+
+    served.page = page
+    reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
+    writer.write(HEAD + b"\r\n")
+    await served.left()
+    async with asyncio.timeout(5):
+        with contextlib.suppress(ConnectionError):
+            while not reader.at_eof():
+                writer.write(late * 2000)
+                await writer.drain()
+                await asyncio.sleep(0.01)
+    assert 0 < len(parsed) <= (websocket.LATE + websocket.SLICE) // 6
+    writer.transport.abort()
+
+
+async def test_what_crosses_the_last_word_does_not_take_its_reason(served):
+    async def page(socket):
+        await socket.receive_text()
+        await socket.close(1013, "enough")
+
+    served.page = page
+    async with connect(f"ws://127.0.0.1:{served.port}/", ping_interval=None) as socket:
+        socket.transport.write(frame(Opcode.TEXT, b"x" * 90) * 30)
+        with pytest.raises(ConnectionClosed):
+            await asyncio.wait_for(socket.recv(), 5)
+    assert (socket.close_code, socket.close_reason) == (1013, "enough")
+
+
 async def test_a_head_that_websockets_does_not_read_is_not_waited_with(served):
     more = b"".join(b"X-%d: a\r\n" % number for number in range(150))
     reader, writer = await asyncio.open_connection("127.0.0.1", served.port)

@@ -13,6 +13,7 @@ from typing import Any
 from ico3d.chat.serving.crowd import machine_of
 from ico3d.chat.serving.network import prompt
 from ico3d.chat.serving.network.certificates import Certificate
+from ico3d.chat.serving.network.records import CountedRecords
 
 
 class Handshake(asyncio.Protocol):
@@ -42,7 +43,10 @@ class Handshake(asyncio.Protocol):
         begun = loop.start_tls(
             transport, self, self.context, server_side=True, ssl_handshake_timeout=prompt.HEAD
         )
-        self._task = loop.create_task(self._hand_over(transport, _under_way(begun)))
+        secured = _under_way(begun)
+        deciphers: Any = transport.get_protocol()
+        transport.set_protocol(CountedRecords(transport, deciphers))
+        self._task = loop.create_task(self._hand_over(transport, secured))
 
     def data_received(self, data: bytes) -> None:
         """Keeps what comes between the handshake's end and its notice."""

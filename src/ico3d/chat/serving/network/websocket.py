@@ -18,6 +18,7 @@ RATE, AT_ONCE = MAX_RATE, 2 * MAX_BURST
 """Pings, pongs and continuations of a second, and at once: each message may come in two pieces."""
 LARGEST_BACKLOG = 1 << 20  # bytes that a peer may leave unread
 LAST_WORDS = 5.0  # s in which a peer may read what was sent before the connection was closed
+LATE = 1 << 12  # bytes that are parsed after the last word, which may have crossed them
 PARTING = 0.2  # s in which one that broke the rules may read why
 
 
@@ -30,6 +31,7 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         self._allowed = Bucket(RATE, AT_ONCE, self.loop.time)
         self._unparsed = memoryview(b"")  # came with messages that are not taken yet
         self._look: asyncio.TimerHandle | None = None
+        self._late = 0  # bytes that were parsed after the last word
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Opens the connection."""
@@ -45,6 +47,8 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Takes bytes: as many as make a message, the rest once it is taken."""
+        if self._late > LATE:
+            return
         self._unparsed = memoryview(bytes(self._unparsed) + data if self._unparsed else data)
         self._parse()
 
@@ -86,10 +90,22 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         """Parses what has come, until there is a message."""
         while self._unparsed and not self.read_paused and not self.transport.is_closing():
             piece, self._unparsed = self._unparsed[:SLICE], self._unparsed[SLICE:]
+            if self.close_sent:
+                self._count_late(len(piece))
             super().data_received(bytes(piece))
             unread = self.transport.get_write_buffer_size() > LARGEST_BACKLOG
             if unread or self._is_no_handshake():
                 self.transport.abort()
+
+    def _count_late(self, size: int) -> None:
+        """Counts what comes after the last word; of who goes on, no more is heard.
+
+        Nothing takes messages then, so that nothing would pause their parsing.
+        """
+        self._late += size
+        if self._late > LATE:
+            self._unparsed = memoryview(b"")
+            self.loop.call_later(PARTING, self.transport.abort)
 
     def _is_no_handshake(self) -> bool:
         """Whether the head was none that websockets reads, after which uvicorn waits for ever."""

@@ -1,0 +1,113 @@
+"""Records of TLS that are too many, or begin another handshake, end their connection."""
+
+import asyncio
+import contextlib
+import ssl
+from datetime import UTC, datetime
+from itertools import pairwise
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ico3d.chat.serving.network import records
+from ico3d.chat.serving.network.certificates import own_certificate
+from ico3d.chat.serving.network.records import CHANGE_CIPHER, HANDSHAKE, CountedRecords
+from support.chat.serving import serving
+
+DATA = 23
+REQUEST = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+
+
+class Line:
+    """A connection, and what deciphers it, which takes eleven bytes at a time."""
+
+    def __init__(self):
+        self.came, self.closed, self.room = b"", False, bytearray(11)
+        transport = SimpleNamespace(is_closing=lambda: self.closed, abort=self.abort)
+        self.counted = CountedRecords(transport, self)  # type: ignore[arg-type]
+
+    def abort(self):
+        self.closed = True
+
+    def get_buffer(self, hint):
+        assert hint > 0
+        return self.room
+
+    def buffer_updated(self, size):
+        self.came += self.room[:size]
+
+
+def record(kind, size):
+    return bytes([kind, 3, 3]) + size.to_bytes(2, "big") + bytes(size)
+
+
+async def fed(data, *cuts):
+    """A line that has got the data, cut at these places."""
+    line, places = Line(), [0, *sorted(cuts), len(data)]
+    for begin, end in pairwise(places):
+        line.counted.data_received(data[begin:end])
+    return line
+
+
+@given(st.data())
+def test_what_comes_is_handed_on_however_it_is_cut(data):
+    sizes = data.draw(st.lists(st.integers(0, 40), max_size=12))
+    whole = b"".join(record(DATA, size) for size in sizes)
+    cuts = data.draw(st.lists(st.integers(0, len(whole)), max_size=12))
+    line = asyncio.run(fed(whole, *cuts))
+    assert line.came == whole and not line.closed
+    assert line.counted._left == 0 and line.counted._head == b""
+
+
+@pytest.mark.parametrize("cut", [1, 4, 5, 6, 4000])
+async def test_small_records_are_counted_wherever_they_are_cut(monkeypatch, cut):
+    monkeypatch.setattr(records, "AT_ONCE", 700.0)
+    monkeypatch.setattr(records, "RATE", 0.0)
+    small = record(DATA, 0)
+    good = await fed(small * 700, *range(cut, 700 * len(small), cut))
+    assert not good.closed
+    line = await fed(small * 701, *range(cut, 701 * len(small), cut))
+    assert line.closed
+
+
+async def test_large_records_cost_nothing(monkeypatch):
+    monkeypatch.setattr(records, "AT_ONCE", 1.0)
+    assert not (await fed(record(DATA, records.LARGE) * 500)).closed
+
+
+async def test_nobody_begins_a_second_handshake():
+    first = record(HANDSHAKE, 300) + record(HANDSHAKE, 70) + record(CHANGE_CIPHER, 1)
+    line = await fed(first + record(HANDSHAKE, 40) + record(DATA, 99))
+    assert not line.closed
+    line.counted.data_received(record(HANDSHAKE, 40))
+    assert line.closed
+    assert (await fed(record(HANDSHAKE, 4) * (records.MOST_HANDSHAKE + 1))).closed
+
+
+@pytest.fixture
+async def secured(body, tmp_path):
+    certificate = own_certificate(tmp_path, ["127.0.0.1"], datetime.now(UTC))
+    trust = ssl.create_default_context(cafile=certificate.file)
+    async with serving(body, certificate=certificate) as (url, _):
+        yield int(url.rstrip("/").rpartition(":")[2]), trust
+
+
+@pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
+async def test_a_server_ends_who_sends_crumbs_in_records(secured, monkeypatch, version):
+    monkeypatch.setattr(records, "AT_ONCE", 300.0)
+    port, trust = secured
+    trust.minimum_version = trust.maximum_version = version
+    reader, writer = await asyncio.open_connection("127.0.0.1", port, ssl=trust)
+    for letter in REQUEST + b"\r\n":
+        writer.write(bytes([letter]))  # a record each
+    assert (await reader.readuntil(b"}")).startswith(b"HTTP/1.1 200")
+    with contextlib.suppress(ConnectionError):
+        for _ in range(100):
+            for letter in REQUEST:
+                writer.write(bytes([letter]))
+            await writer.drain()
+            await asyncio.sleep(0)
+        assert await asyncio.wait_for(reader.read(), 5) == b""
+    writer.transport.abort()
