@@ -3,7 +3,7 @@ import type { Backcloth } from '../soft/contract.ts';
 import { footprintOf, type Ground, type Patch } from './camera/ground.ts';
 
 const SHADOW = [0.3, 0.22] as const; // m to the side and to the front where it has faded to a third, until feet are known
-const SHADES = { far: 0.34, near: 0.12, sole: 0.42 } as const; // share of the light that is missing: around the feet, between them, under a sole
+const SHADES = { far: 0.34, near: 0.08, sole: 0.5 } as const; // share of the light that is missing: around the feet, between them, under a sole
 const NOTICED = 0.004; // m by which feet move before their shadow does
 const LAMP = 0.12; // m over the eyes: the middle of the light on the wall
 const POOL = 0.45; // m from there to where half of the light is gone
@@ -189,7 +189,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     const near = from(under.value, shadow.value);
     let light = 1 - SHADES.far * Math.exp(-near) - SHADES.near * Math.exp(-6 * near);
     for (const [i, size] of sizes.value.entries()) {
-      if (size.x > 0) light *= 1 - SHADES.sole * Math.exp(-(from(soles.value[i]!, size) ** 2));
+      if (size.x > 0) light *= 1 - SHADES.sole * Math.exp(-from(soles.value[i]!, size));
     }
     return depth.value * (1 - light);
   }
@@ -267,7 +267,7 @@ const FRAGMENT = `
     float light = 1.0 - ${number(SHADES.far)} * exp(-near) - ${number(SHADES.near)} * exp(-6.0 * near);
     for (int i = 0; i < 2; i++) {
       float pressed = from(place, soles[i], max(sizes[i], vec2(1e-4)));
-      if (sizes[i].x > 0.0) light *= 1.0 - ${number(SHADES.sole)} * exp(-pressed * pressed);
+      if (sizes[i].x > 0.0) light *= 1.0 - ${number(SHADES.sole)} * exp(-pressed);
     }
     return depth * (1.0 - light);
   }

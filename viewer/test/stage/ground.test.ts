@@ -5,7 +5,7 @@ import { footprintOf, type Ground } from '../../src/stage/camera/ground.ts';
 const BLUR = 0.2; // m
 const WIDTH = 0.04; // m from the middle of a foot to where its sides count: a twentieth of all may be strays
 const DEPTH = 0.108; // m
-const EDGE = 0.025; // m
+const EDGE = 0.06; // m
 const ground: Ground = { foot: new Vector3(1, 0.5, 2), up: new Vector3(0, 1, 0), toward: new Vector3(0, 0, 1) };
 
 /** Two feet of 0.24 × 0.1 m beside each other, `apart` m between their middles, and hands over them. */

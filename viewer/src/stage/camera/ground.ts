@@ -22,7 +22,7 @@ const LOW = 0.15; // m over the floor: feet, and what trails
 const TOUCHING = 0.05; // m over the floor: soles, with a shoe's sides
 const STRAYS = 0.05; // share of the points, at either end, that may lie anywhere
 const BLUR = 0.2; // m by which the shadow fades beyond the feet
-const EDGE = 0.025; // m by which it fades beyond a sole
+const EDGE = 0.06; // m by which it fades beyond a sole
 
 /**
  * Where a shadow lies under somebody.
