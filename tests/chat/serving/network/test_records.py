@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import ssl
-from datetime import UTC, datetime
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -12,9 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ico3d.chat.serving.network import records
-from ico3d.chat.serving.network.certificates import own_certificate
 from ico3d.chat.serving.network.records import CHANGE_CIPHER, HANDSHAKE, CountedRecords
-from support.chat.serving import serving
 
 DATA = 23
 REQUEST = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -84,14 +81,6 @@ async def test_nobody_begins_a_second_handshake():
     line.counted.data_received(record(HANDSHAKE, 40))
     assert line.closed
     assert (await fed(record(HANDSHAKE, 4) * (records.MOST_HANDSHAKE + 1))).closed
-
-
-@pytest.fixture
-async def secured(body, tmp_path):
-    certificate = own_certificate(tmp_path, ["127.0.0.1"], datetime.now(UTC))
-    trust = ssl.create_default_context(cafile=certificate.file)
-    async with serving(body, certificate=certificate) as (url, _):
-        yield int(url.rstrip("/").rpartition(":")[2]), trust
 
 
 @pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
