@@ -1,13 +1,3 @@
-/** The slope of y over x by least squares, with its standard error. */
-export function slope(x: number[], y: number[]): { perUnit: number; error: number } {
-  const mean = (values: number[]) => values.reduce((sum, value) => sum + value, 0) / values.length;
-  const [meanX, meanY] = [mean(x), mean(y)];
-  const spread = x.reduce((sum, value) => sum + (value - meanX) ** 2, 0);
-  const perUnit = x.reduce((sum, value, i) => sum + (value - meanX) * (y[i]! - meanY), 0) / spread;
-  const rest = y.reduce((sum, value, i) => sum + (value - meanY - perUnit * (x[i]! - meanX)) ** 2, 0);
-  return { perUnit, error: Math.sqrt(rest / (x.length - 2) / spread) };
-}
-
 /** The value under which a fraction of all values lies. */
 export function quantile(values: number[], fraction: number): number {
   const sorted = [...values].sort((a, b) => a - b);
