@@ -75,13 +75,13 @@ def test_the_neck_goes_over_into_the_heads_without_a_step(body, build):
     part = np.linspace(-0.5, 1.5, 201)[:, None]
     for side in around:
         moves, _ = change.at(low + part * (top - low) + side)  # 0.9 mm apart
-        assert np.abs(moves[part[:, 0] > 1.35]).max() < 1e-6
+        assert np.abs(moves[part[:, 0] > 1.35]).max() < 1e-5
         assert np.linalg.norm(np.diff(moves, axis=0), axis=1).max() < 6e-4
 
 
 def test_everything_but_head_hands_and_shoes_grows_with_the_build(body, builds):
     solid = body.opacities > 127
-    for part in ("spine", "upperleg", "upperarm", "root"):
+    for part in ("spine", "upperleg", "upperarm"):
         hangs = solid & _hangs_on(body, part)
         sizes = [ConvexHull(builds[b].means[hangs]).volume for b in ("slender", "medium", "sturdy")]
         assert 1.02 * sizes[0] < sizes[1] < sizes[2] / 1.02, part
