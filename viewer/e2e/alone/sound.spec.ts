@@ -1,4 +1,4 @@
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
 import { feed, noise } from '../../support/sound/feeder.ts';
 import { drawnBy } from '../../support/browser/path.ts';
@@ -16,11 +16,14 @@ const SIZE = 128; // pixels; in much smaller windows Chromium draws once a secon
 
 let server: Awaited<ReturnType<typeof servePage>>;
 let browser: Browser;
+const folder = scratchFolder();
 
 beforeAll(async () => {
-  const folder = scratchFolder();
   runPython('references/phase_bundle.py', folder);
   server = await servePage(folder);
+});
+
+beforeEach(async () => {
   browser = await Browser.launch({ width: SIZE, height: SIZE });
   await lookAsBundled(await browser.open(drawnBy('webgl', server.url)), folder);
   await browser.page.evaluate(`window.noise = ${noise.toString()}`);
@@ -28,10 +31,8 @@ beforeAll(async () => {
   await watch();
 });
 
-afterAll(async () => {
-  await browser?.close();
-  server?.close();
-});
+afterEach(() => browser?.close());
+afterAll(() => server?.close());
 
 interface Sight {
   frame: number; // of the audio clock, as heard when the picture was drawn
@@ -60,7 +61,8 @@ function watch(): Promise<void> {
   });
 }
 
-test(`over ${SECONDS} s every sample is where it belongs and the face stays with it`, async () => {
+test(`over ${SECONDS} s every sample is where it belongs and the face stays with it`, { retry: 2 }, async () => {
+  // again where the machine stood still for longer than pieces come ahead: what is wrong with the page is wrong each time
   const { page } = browser;
   await feed(page, 0, SECONDS);
   await page.waitForTimeout(1000 * (SECONDS + 2));
