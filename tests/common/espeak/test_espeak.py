@@ -176,7 +176,7 @@ def test_a_fork_while_a_thread_asks_waits_for_nobody():
     """A program that the event loop starts is such a fork, and the loop waits for it."""
     synthesize("One.")
     with ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(synthesize, "a long sentence about the weather " * 60)
+        asked = pool.submit(synthesize, "a long sentence about the weather " * 300)
         time.sleep(0.1)  # by now it waits for the sound
         child = os.fork()
         if child == 0:
