@@ -1,9 +1,10 @@
 """Decodes pictures completely or not at all: a truncated JPEG is an error, not half grey."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
@@ -86,32 +87,27 @@ def open_picture(
     if isinstance(source, Path):
         check_regular(source)
     stream = io.BytesIO(source) if isinstance(source, bytes) else source
-    _check_beside(source, what)
+    beside = f"{what}: the picture has more beside its pixels than cameras make."
+    _refuse_if(has_large_chunks, source, beside)  # before Pillow, which reads all of it
     try:
         picture = Image.open(stream, formats=formats)
     except Image.DecompressionBombError as error:
         raise CaptureError(f"{what}: the picture is larger than is taken.") from error
     try:
         check_size(what, *picture.size)
-        _check_scans(source, what)
+        passes = f"{what}: the picture has more passes than cameras make."
+        _refuse_if(has_many_scans, source, passes)
     except CaptureError:
         picture.close()
         raise
     return picture
 
 
-def _check_beside(source: Path | bytes, what: str) -> None:
-    """Refuses a PNG picture with much beside its pixels, all of which would be kept."""
+def _refuse_if(found: Callable[[BinaryIO], bool], source: Path | bytes, sentence: str) -> None:
+    """Raises a CaptureError with this sentence where something is found in a picture's file."""
     with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
-        if has_large_chunks(file):
-            raise CaptureError(f"{what}: the picture has more beside its pixels than cameras make.")
-
-
-def _check_scans(source: Path | bytes, what: str) -> None:
-    """Refuses a JPEG picture of many passes, each of which takes the time of a whole picture."""
-    with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
-        if has_many_scans(file):
-            raise CaptureError(f"{what}: the picture has more passes than cameras make.")
+        if found(file):
+            raise CaptureError(sentence)
 
 
 def check_size(what: str, width: int, height: int) -> None:
