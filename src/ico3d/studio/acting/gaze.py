@@ -7,13 +7,19 @@ import numpy as np
 from ico3d.studio.acting.performance import Performance
 from ico3d.studio.person.subject import Material, Subject
 
+KAPPA = float(np.radians(4.5))
+"""Angle in radians from the line of sight outwards to the axis through the pupil.
+
+The spot of sharpest sight lies beside the eye's pole, so that the pupils of people who look at one
+stand a little apart; eyes whose axes meet on the visitor seem to squint.
+"""
 GAZES = ("visitor", "ahead")
 """Where a person looks between glances: at who stands before the first camera, or straight ahead
 of the head."""
 
 
 def looking(subject: Subject, acted: Performance, point: np.ndarray) -> Performance:
-    """The performance with the eyes on a point in the world; glances leave it and come back.
+    """The performance with the sight on a point in the world; glances leave it and come back.
 
     Args:
         subject: The person.
@@ -29,7 +35,7 @@ def looking(subject: Subject, acted: Performance, point: np.ndarray) -> Performa
         yaw, pitch = _angles(towards)
         ahead = _angles(eye.axis)
         pairs = (
-            (("Out", "In"), across * (outward, outward), outward * (yaw - ahead[0])),
+            (("Out", "In"), across * (outward, outward), outward * (yaw - ahead[0]) + KAPPA),
             (("Up", "Down"), height, pitch - ahead[1]),
         )
         for (one, other), (most, least), wanted in pairs:

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ico3d.common.unpacking.npz import read_npz
 from ico3d.errors import CaptureError
-from ico3d.studio.person.edges import sides, without_covered_neck
+from ico3d.studio.person.bends import with_soft_bends
+from ico3d.studio.person.edges import without_covered_neck
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.smooth import smoothed
 from ico3d.studio.person.subject import GARMENTS, Eye, Look, Material, Subject
@@ -41,8 +41,6 @@ MATERIAL_BELOW = {
 """Materials of garments that only a whole person wears."""
 WORN = (Material.CLOTH, Material.TROUSERS)
 """What is split once more on a whole person."""
-ARMPIT, SOFTER = 0.13, 40
-"""Metres about a shoulder's joint in which weights of the jumper are smoothed, and how often."""
 LARGEST = 1 << 28
 """Bytes of all arrays as numbers of 64 bits; 53 blendshapes of 27,000 vertices would take 34 MB."""
 MOST_VERTICES = 1 << 19
@@ -67,6 +65,8 @@ RELAXED_ARMS = {
 
 AWAKE = 0.4
 """Part of the shape that widens the eyes that a face at rest has: the files' lids hang low."""
+LOWER_TEETH = 0.0016
+"""Metres by which teeth lie lower than in the files, whose upper ones hide behind the lip."""
 LOOKS = {
     "eyeLookUp": (-18.0, 0.0),
     "eyeLookDown": (22.0, 0.0),
@@ -119,7 +119,7 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
         if not whole:
             return subject
         # Shade is found at vertices: those of a sleeve lay 16 mm apart.
-        return smoothed(_with_soft_armpits(subject), np.isin(subject.materials, WORN), 0.0)
+        return smoothed(with_soft_bends(subject), np.isin(subject.materials, WORN), 0.0)
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:
@@ -153,6 +153,7 @@ def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:
     materials = np.array([known.get(p, 255) for p in parts], np.uint8)
     names, moved, deltas = _blendshapes(arrays, used)
     _open_lids(vertices, names, moved, deltas)
+    _lower_teeth(vertices, arrays, used)
     male = name.endswith("_m")
     return Subject(
         name=name,
@@ -192,6 +193,14 @@ def _open_lids(
             wider = AWAKE * deltas[names.index(f"eyeWide{side}")]
             vertices[moved] += wider
             deltas[names.index(f"eyeBlink{side}")] -= wider
+
+
+def _lower_teeth(vertices: np.ndarray, arrays: dict[str, np.ndarray], used: np.ndarray) -> None:
+    """Moves both rows of teeth with their gums down, in place."""
+    parts = [str(p) for p in arrays["part_names"]]
+    rows = [parts.index(p) for p in ("teeth", "gums") if p in parts]
+    on = np.unique(arrays["faces"][np.isin(arrays["face_part"], rows)])
+    vertices[np.isin(used, on), 1] -= LOWER_TEETH
 
 
 def _with_turning_eyes(subject: Subject) -> Subject:
@@ -261,32 +270,6 @@ def _skeleton(arrays: dict[str, np.ndarray], used: np.ndarray, origin: np.ndarra
         arrays["joint_pos"].astype(float) - origin,
         weights[used] / weights[used].sum(axis=1, keepdims=True),
     )
-
-
-def _with_soft_armpits(subject: Subject) -> Subject:
-    """The person whose jumper bends over a hand's breadth between trunk and arm, without shards."""
-    bones = subject.skeleton
-    if bones is None:
-        return subject
-    knit = subject.faces[subject.materials == Material.CLOTH]
-    worn = np.unique(knit)
-    a, b = np.searchsorted(worn, np.unique(sides(knit), axis=0)).T
-    rows, columns = np.r_[a, b], np.r_[b, a]
-    share_of = 1 / np.bincount(rows, minlength=len(worn))
-    around = csr_array((share_of[rows], (rows, columns)), shape=(len(worn), len(worn)))
-    away = np.min(
-        [
-            np.linalg.norm(subject.vertices[worn] - bones.at[bones.index(name)], axis=1)
-            for name in ("upperarm01.L", "upperarm01.R")
-        ],
-        axis=0,
-    )
-    share = np.exp(-((away / ARMPIT) ** 2))[:, None]  # (N, 1)
-    weights = bones.weights.copy()
-    for _ in range(SOFTER):
-        own = weights[worn]
-        weights[worn] = own + share * (around @ own - own)  # towards the mean of the neighbours
-    return replace(subject, skeleton=replace(bones, weights=weights))
 
 
 def _positions_in(used: np.ndarray, indices: np.ndarray) -> np.ndarray:

@@ -9,6 +9,10 @@ from ico3d.splat.cpu.compile import subroutine
 from ico3d.studio.picture.textures import grain, noise, smoothstep, strands
 
 
+GROOVE = 0.0016
+"""Half of the width of the groove along a tongue, metres."""
+
+
 class Spot(NamedTuple):
     """Surface properties at one point.
 
@@ -81,6 +85,25 @@ def flesh(red, green, blue, x, y, z, pixel):
     """Wet gums, tongue and the inside of the cheeks."""
     shade = 1.0 + 0.12 * grain(x, y, z, 0.0035, pixel) + 0.08 * grain(x, y, z, 0.0014, pixel)
     return Spot(red * shade, green * shade, blue * shade, 0.42, 0.035, 0.3, 0.08, 0.0)
+
+
+@subroutine(fast=False)
+def tongue(x, y, z, pixel):
+    """A moist back with a groove along its middle, pale with fine bumps and pink at its sides."""
+    groove = math.exp(-((x / GROOVE) ** 2)) * smoothstep(0.066, 0.050, z)
+    coat = 0.5 + 0.5 * grain(x, y, z, 0.0011, pixel) + 0.4 * grain(x + 3.0, y, z, 0.0040, pixel)
+    pale = max(0.0, coat) * (1.0 - smoothstep(0.006, 0.015, abs(x)))
+    shade = 1.0 - 0.38 * groove
+    return Spot(
+        (0.56 + 0.06 * pale) * shade,
+        (0.25 + 0.10 * pale) * shade,
+        (0.23 + 0.09 * pale) * shade,
+        0.36,
+        0.04,
+        0.3,
+        0.24,
+        0.0,
+    )
 
 
 @subroutine(fast=False)

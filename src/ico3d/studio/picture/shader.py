@@ -23,7 +23,7 @@ TROUSERS, SHOE, SOCK = int(Material.TROUSERS), int(Material.SHOE), int(Material.
 SKIRT, FRAME = int(Material.SKIRT), int(Material.FRAME)
 
 
-MOUTH_DEPTH = 0.026
+MOUTH_DEPTH = 0.042
 """Distance in metres behind the lips over which light in the mouth falls to 1/e."""
 TOGETHER = 0.01
 """Relative difference of nearness up to which samples of a pixel show one surface."""
@@ -164,7 +164,7 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
     if material == GUMS:
         return paints.flesh(0.42, 0.15, 0.14, x, y, z, pixel)
     if material == TONGUE:
-        return paints.flesh(0.46, 0.18, 0.16, x, y, z, pixel)
+        return paints.tongue(x, y, z, pixel)
     return paints.flesh(0.34, 0.11, 0.10, x, y, z, pixel)
 
 
@@ -227,6 +227,8 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
     inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
     r, g, bl = lit(spot, lights, n, v, p, smooth, (0.35 + 0.65 * occlusion) * inward, LOOKED_UP)
     # Deep in the mouth, light has been red-tinted by lips and cheeks.
+    if material == TEETH:
+        return r * inward, g * inward**1.12, bl * inward**1.25
     return r * (0.25 + 0.75 * inward), g * inward**1.4, bl * inward**1.6
 
 

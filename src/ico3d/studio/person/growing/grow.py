@@ -18,7 +18,7 @@ LOOSE = 20000
 """Strands of long hair that falls on the shoulders."""
 TAIL = 3600
 """Strands in a tail."""
-BABY_HAIRS, FLYAWAYS, WISP = 2600, 420, 16
+BABY_HAIRS, FLYAWAYS, WISP = 2600, 260, 22
 """Short hairs at the hairline of tied hair, strands that leave its surface, strands of a wisp."""
 RADIUS = 0.00013
 """Half of a strand's thickness in metres: thicker than real hair, which is more numerous."""

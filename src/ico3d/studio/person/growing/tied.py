@@ -58,7 +58,7 @@ def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Gen
     full = 0.0050 + 0.0062 * smooth(0.2, 0.9, path[..., 1]) * np.sin(np.pi * t) ** 0.5
     full = full + 0.004 * smooth(0.2, 0.8, t)[None]
     full = full * (1 + 0.05 * random.standard_normal(LOCKS)[lock] - 0.06 * edge)[:, None]
-    rise = 1 - np.exp(-7 * t)
+    rise = 1 - np.exp(-4 * t)
     above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)  # (N,)
     height = above[:, None] * np.exp(-6 * t) + s * 0.0008
     height += s * rise * full * (0.15 + 0.85 * level[:, None])

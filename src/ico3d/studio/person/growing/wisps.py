@@ -13,10 +13,10 @@ BABY_TAPER, FRAMING_TAPER, FLYAWAY_TAPER = 0.42, 0.55, 0.45
 LIGHT = 1.25
 """Tone of strands that stand alone: light goes through them from all sides."""
 FRAMING = (
-    (1.0, 1.12, 0.004, 0.098),
-    (1.0, 1.26, 0.006, 0.072),
-    (-1.0, 1.10, 0.004, 0.084),
-    (-1.0, 1.22, 0.006, 0.108),
+    (1.0, 1.12, 0.004, 0.062),
+    (1.0, 1.26, 0.006, 0.044),
+    (-1.0, 1.10, 0.004, 0.052),
+    (-1.0, 1.22, 0.006, 0.066),
 )
 """Wisps before the ears: side, azimuth of the root in radians, metres inside the hairline, and
 length in metres."""
