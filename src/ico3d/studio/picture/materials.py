@@ -8,7 +8,6 @@ import numpy as np
 from ico3d.splat.cpu.compile import subroutine
 from ico3d.studio.picture.textures import grain, noise, smoothstep, strands
 
-
 GROOVE = 0.0016
 """Half of the width of the groove along a tongue, metres."""
 
