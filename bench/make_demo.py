@@ -93,7 +93,7 @@ HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
 BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=10)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
-    "--steps 7000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 4500 "
+    "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5500 "
     "--density.gradient 0.00018 --density.min-contribution 0.15"
 )
 TRAIN_BODY = (
