@@ -1,9 +1,9 @@
-"""Eyes turn with their shapes, and both meet at the point that the person looks at."""
+"""Eyes turn with their shapes, and the sight of both meets at the point that is looked at."""
 
 import numpy as np
 import pytest
 
-from ico3d.studio.acting.gaze import looking
+from ico3d.studio.acting.gaze import KAPPA, looking
 from ico3d.studio.acting.performance import Performance
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.skeleton import about
@@ -28,22 +28,33 @@ def _still(subject, degrees):
 
 @pytest.mark.parametrize("degrees", [0.0, 6.0, -6.0])
 @pytest.mark.parametrize("away", [0.5, 1.35])
-def test_both_eyes_meet_at_the_point(anny, degrees, away):
+def test_the_sight_of_both_eyes_meets_at_the_point(anny, degrees, away):
     point = anny.head_in_world + np.array([0.02, 0.03, away])
     acted = looking(anny, _still(anny, degrees), point)
     inverse = np.linalg.inv(acted.world_from_head[0])
     local = inverse[:3, :3] @ point + inverse[:3, 3]
-    for row in eye_rows(anny, anny.posed(acted.weights[0])):
-        wanted = (local - row[:3]) / np.linalg.norm(local - row[:3])
+    for row, outward in zip(eye_rows(anny, anny.posed(acted.weights[0])), (1, -1), strict=True):
+        sight = (local - row[:3]) / np.linalg.norm(local - row[:3])
+        # The axis through the pupil stands outward of the line of sight, the left eye's to the
+        # person's left.
+        wanted = about(np.array([0.0, 1.0, 0.0]), outward * KAPPA) @ sight
         assert np.degrees(np.arccos(min(1.0, row[9:12] @ wanted))) < 1.2
 
 
 def test_a_glance_leaves_the_point_as_far_as_it_left_ahead(anny):
-    acted = _still(anny, 0.0)
-    glance = [anny.blendshape_names.index(f"eyeLook{w}") for w in ("OutLeft", "InRight")]
-    acted.weights[0, glance] = 0.3
     point = anny.head_in_world + np.array([0.0, 0.0, 1e3])  # straight ahead of anny's eyes
-    np.testing.assert_allclose(looking(anny, acted, point).weights, acted.weights, atol=2e-3)
+    calm, glancing = _still(anny, 0.0), _still(anny, 0.0)
+    glance = [anny.blendshape_names.index(f"eyeLook{w}") for w in ("OutLeft", "InRight")]
+    glancing.weights[0, glance] = 0.3
+
+    def turned(acted):
+        x, _, z = eye_rows(anny, anny.posed(acted.weights[0]))[:, 9:12].T
+        return np.degrees(np.arctan2(x, z))
+
+    at_rest = turned(glancing) - turned(calm)
+    on_point = turned(looking(anny, glancing, point)) - turned(looking(anny, calm, point))
+    assert at_rest.min() > 4
+    np.testing.assert_allclose(on_point, at_rest, atol=0.3)
 
 
 def test_anny_has_hair_brows_and_lashes_of_strands(anny):
