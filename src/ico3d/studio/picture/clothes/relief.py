@@ -82,7 +82,7 @@ def folds(w):
     slant = 9.3 * w.y + 4.6 * w.x + 2.3 * drift
     second = 0.5 + 0.5 * math.sin(slant)
     swell = swell * swell * (3.0 - 2.0 * swell)
-    return w.fold * (first * first * (0.25 + 0.95 * swell) + 0.35 * second * (1.0 - swell))
+    return w.fold * (first * first * (0.06 + 1.14 * swell) + 0.35 * second * (1.0 - swell))
 
 
 @subroutine()
