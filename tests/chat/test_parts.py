@@ -87,7 +87,7 @@ def test_rows_are_those_of_the_whole_sentence(bundle):
 
 def test_without_a_speech_model_only_the_eyes_move(bundle):
     info = bundle.manifest.head
-    rows = Face(info, None, seed=3).rows(np.zeros((500, 0)), start=0.0)
+    rows = Face(info, None, seed=3).rows(np.zeros((500, 0)), np.zeros(0, np.int16), start=0.0)
     assert (rows[:, :32] == np.float32(info.idle_expression[:32])).all()
     assert rows[:, 37].max() == pytest.approx(1.0, abs=0.1)  # a blink
 

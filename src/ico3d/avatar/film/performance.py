@@ -11,6 +11,7 @@ from ico3d.capture.capture import Sound
 from ico3d.common.expression import expression_rows
 from ico3d.errors import SettingsError
 from ico3d.head.expressions import FEATURE_RATE
+from ico3d.speech.emphasis import Emphasis
 from ico3d.speech.eyes import EyeBehaviour
 from ico3d.splat.gaussians import Gaussians
 
@@ -109,7 +110,10 @@ def speaking_face(actor: Actor, sound: Sound, seed: int) -> Face:
             "there is no face here that sound moves: --audio is for heads that were trained with "
             "--inputs speech, and for whole persons with such a head."
         )
-    return _face(actor, actor.lips(sound.samples, sound.rate), seed)
+    lips = actor.lips(sound.samples, sound.rate)
+    times = np.arange(len(lips)) / FEATURE_RATE
+    brows = Emphasis().values(times, sound.samples, sound.rate)  # (T, 7)
+    return _face(actor, lips, np.clip(EyeBehaviour(seed).values(times) + brows, 0, 1))
 
 
 def still_face(actor: Actor, seconds: float, seed: int) -> Face:
@@ -120,9 +124,9 @@ def still_face(actor: Actor, seconds: float, seed: int) -> Face:
         seconds: Length of the film.
         seed: Seed of the blinks.
     """
-    return _face(actor, np.zeros((int(seconds * FEATURE_RATE) + 1, 0), np.float32), seed)
+    lips = np.zeros((int(seconds * FEATURE_RATE) + 1, 0), np.float32)
+    return _face(actor, lips, EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE))
 
 
-def _face(actor: Actor, lips: np.ndarray, seed: int) -> Face:
-    eyes = EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE)
+def _face(actor: Actor, lips: np.ndarray, eyes: np.ndarray) -> Face:
     return Face(expression_rows(actor.idle, lips, eyes, actor.eye_offset))

@@ -1,4 +1,4 @@
-"""The face of one session: rows of expressions for sound, and eyes that move between sentences."""
+"""The face of one session: rows of expressions for sound, eyes and brows."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -13,6 +13,7 @@ from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
+from ico3d.speech.emphasis import Emphasis
 from ico3d.speech.eyes import EyeBehaviour
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions, open_speech
 
@@ -36,7 +37,7 @@ class Lips(Protocol):
 
 
 class Face:
-    """The face of one session: the speech model, and eyes that keep moving between sentences."""
+    """The face of one session: the speech model, brows, and eyes that move between sentences."""
 
     def __init__(
         self,
@@ -57,7 +58,7 @@ class Face:
         self.moods = Moods()
         self._info = info
         self._model, self._remote = model, remote
-        self._eyes = EyeBehaviour(seed)
+        self._eyes, self._emphasis = EyeBehaviour(seed), Emphasis()
 
     @property
     def is_remote(self) -> bool:
@@ -77,11 +78,13 @@ class Face:
         if self._remote is not None:
             self._remote.close()
 
-    def rows(self, lips: np.ndarray, start: float) -> np.ndarray:
+    def rows(self, lips: np.ndarray, sound: np.ndarray, start: float) -> np.ndarray:
         """Full rows of expressions from mouth values.
 
         Args:
             lips: (n, C) mouth values; C = 0 for a mouth at rest.
+            sound: (S,) int16 at 24 kHz from the first row on, which the brows follow: of these rows
+                and what is known after them.
             start: Time of the first row on the session's clock in seconds, which the eyes follow.
 
         Returns:
@@ -89,8 +92,9 @@ class Face:
         """
         times = start + np.arange(len(lips)) / EXPRESSION_FPS
         idle, at = np.array(self._info.idle_expression), self._info.eye_offset
-        eyes = np.clip(self._eyes.values(times) + self.moods.values(times), 0, 1)
-        return expression_rows(idle, lips, eyes, at)
+        stressed = self._emphasis.values(times, sound.astype(np.float32) / 32768, SPEECH_RATE)
+        eyes = self._eyes.values(times) + self.moods.values(times) + stressed
+        return expression_rows(idle, lips, np.clip(eyes, 0, 1), at)
 
 
 class StillLips:

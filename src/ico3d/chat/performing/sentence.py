@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.chat.performing.face import ROW, Face
 from ico3d.chat.wire.protocol import EXPRESSION_FPS
 from ico3d.common.espeak.speech import Phoneme
+from ico3d.speech.emphasis import NEEDED
 
 MOST, LEAST = 5, 3
 """Rows of a piece: 200 and 120 ms."""
@@ -85,9 +86,10 @@ class Sentence:
         self._rows.extend(self._lips.push(pcm.astype(np.float32) / 32768))
 
     def _cut(self, count: int) -> Piece:
+        ahead = self._pcm[: (count + NEEDED) * ROW]
         pcm, self._pcm = self._pcm[: count * ROW], self._pcm[count * ROW :]
         lips, self._rows = np.stack(self._rows[:count]), self._rows[count:]  # (count, C)
         first = self._next
         self._next += count
-        rows = self._face.rows(lips, self._start + first / EXPRESSION_FPS)
+        rows = self._face.rows(lips, ahead, self._start + first / EXPRESSION_FPS)
         return Piece(first, pcm, rows)
