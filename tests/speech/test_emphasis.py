@@ -54,7 +54,7 @@ def test_strokes_keep_their_distance():
     rng = np.random.default_rng(1)
     raised = values(rng.uniform(-40, -10, 2000))[:, RAISED[0]]
     begun = np.flatnonzero((raised[1:] > 0) & (raised[:-1] == 0)) / 25
-    assert 10 < len(begun) and np.diff(begun).min() >= PAUSE - 1e-9
+    assert len(begun) > 10 and np.diff(begun).min() >= PAUSE - 1e-9
 
 
 def test_who_was_interrupted_raises_brows_again():

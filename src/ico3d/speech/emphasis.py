@@ -1,8 +1,8 @@
 """Brows that rise with the syllables a voice stresses (numpy).
 
-People raise their brows at words that matter, mostly with an accent of the voice (Flecha-García 2010,
-Speech Communication 52:542, "Eyebrow raises in dialogue and their relation to discourse structure,
-utterance function and pitch accents in English": they begin some 60 ms before the accent).
+People raise their brows at words that matter, mostly with an accent of the voice, and begin some
+60 ms before it (Flecha-García 2010, "Eyebrow raises in dialogue and their relation to discourse
+structure, utterance function and pitch accents in English", Speech Communication 52:542).
 """
 
 import numpy as np
