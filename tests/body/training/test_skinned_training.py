@@ -52,6 +52,26 @@ def test_it_begins_on_the_skin(capture):
     assert (outward.sum(1) > 0).all()
 
 
+def test_more_gaussians_begin_where_pictures_are_finer(tmp_path):
+    """Three cameras of seven show what is above the middle four times as large, and only that."""
+    capture = TrackedCapture(tmp_path)
+    even = _above(trainer_of(capture, "skinned", window=CLIP))
+    lens = capture.cameras[0].intrinsics * [[4.0, 1, 1], [1, 4.0, 1], [1, 1, 1]]
+    lens[1, 2] = capture.cameras[0].height  # the middle is at the lower edge
+    near = [replace(camera, intrinsics=lens) for camera in capture.cameras[:3]]
+    capture.cameras = (*near, *capture.cameras[3:])
+    finer = _above(trainer_of(capture, "skinned", window=CLIP))
+    # Their square is 4 · 1 + 3 · 16 of 7 · 1 where all of it is seen: 2.7 times as fine.
+    assert 1.5 < (finer / (1 - finer)) / (even / (1 - even)) < 3.2
+
+
+def _above(trainer) -> float:
+    """Share of the trunk's Gaussians above its middle."""
+    gaussians = trainer.model.gaussians
+    trunk = gaussians["skin_joints"][:, 0] == 0
+    return float((gaussians["means"][trunk, 1] > 0).float().mean())
+
+
 def test_what_stands_off_the_skin_is_found(tmp_path):
     """A hat on the trunk begins at rest; what other frames show to be empty does not."""
     capture = TrackedCapture(tmp_path)

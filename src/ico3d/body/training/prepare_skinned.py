@@ -52,8 +52,8 @@ def begin_skinned(
     """
     track = tracked(capture)
     count = min(settings.initial.gaussians, settings.density.max_gaussians)
-    skin = _seen(sampled(track, SPARE * count, rng), track, capture, window)
-    skin = _dressed(skin, track, capture, window, count, settings, rng)
+    skin, fine = _seen(sampled(track, SPARE * count, rng), track, capture, window)
+    skin = _dressed(skin, fine, track, capture, window, count, settings, rng)
     if companion is not None:
         skin = _beside(companion, skin, track, window, rng)
     places = skin.posed(track, window.center)  # (P, 3)
@@ -86,26 +86,39 @@ def tracked(capture: Capture) -> BodyTrack:
     return track
 
 
-def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Skin:
-    """The points that some training camera sees at one of several frames.
+def _seen(
+    skin: Skin, track: BodyTrack, capture: Capture, window: Window
+) -> tuple[Skin, np.ndarray]:
+    """The points that some training camera sees at one of several frames, and how finely, (P,).
 
-    Several frames are tested, as arms hide what is under them.
+    Several frames are tested, as arms hide what is under them. Fineness is in pixels per metre, the
+    root mean square of the pictures that show a point; what lies beside all of them counts as the
+    coarsest.
 
     Raises:
         CaptureError: If no point is seen.
     """
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
-    seen = np.zeros(len(skin), bool)
+    seen, views, squares = np.zeros(len(skin), bool), *np.zeros((2, len(skin)))
     for frame in window.moments(MOMENTS):
         places = skin.posed(track, frame)  # (P, 3)
         gap = HIDING * float(np.median(spacing(places)))
-        seen |= np.any([visible(places, camera, gap) for camera in cameras], axis=0)  # (P,)
+        for camera in cameras:
+            shown = visible(places, camera, gap)  # (P,)
+            seen |= shown
+            pixels, depths = camera.project(places)  # (P, 2), (P,)
+            inside = (pixels >= 0) & (pixels <= (camera.width, camera.height))
+            shown &= inside.all(axis=1)
+            views[shown] += 1
+            squares[shown] += (camera.intrinsics[0, 0] / depths[shown]) ** 2
     if not seen.any():
         raise CaptureError(
             f"{capture.path}: the body track lies outside of all pictures: "
             "delete it and run ico3d capture pose again."
         )
-    return skin[seen]
+    fine = np.sqrt(squares / np.maximum(views, 1))
+    coarsest = fine[views > 0].min() if views.any() else 1.0
+    return skin[seen], np.maximum(fine, coarsest)[seen]
 
 
 def _beside(
@@ -121,6 +134,7 @@ def _beside(
 
 def _dressed(
     skin: Skin,
+    fine: np.ndarray,
     track: BodyTrack,
     capture: Capture,
     window: Window,
@@ -128,19 +142,25 @@ def _dressed(
     settings: BodySettings,
     rng: np.random.Generator,
 ) -> Skin:
-    """`count` points of the skin and of what stands off it, in proportion to their surfaces."""
+    """`count` points of the skin and of what stands off it, in proportion to their surfaces.
+
+    Those of the skin are the denser the finer (P,) pictures show it.
+    """
     frame, others = window.center, sorted({window.first, window.last})
     start = initial_points(capture, frame, SURFACE, rng, settings.initial.source)
     off = standing_off(skin, track, capture, start.points, frame, others)
     beside = min(round(count * len(off) / SURFACE), len(off))
-    return Skin.joined(_some(off, beside, rng), _some(skin, count - beside, rng))
+    return Skin.joined(_some(off, beside, rng), _some(skin, count - beside, rng, fine))
 
 
-def _some(skin: Skin, count: int, rng: np.random.Generator) -> Skin:
-    """At most `count` of the points, chosen at random."""
+def _some(
+    skin: Skin, count: int, rng: np.random.Generator, weights: np.ndarray | None = None
+) -> Skin:
+    """At most `count` of the points, chosen at random, in proportion to weights (P,) if given."""
     if len(skin) <= count:
         return skin
-    return skin[np.sort(rng.choice(len(skin), count, replace=False))]
+    share = None if weights is None else weights / weights.sum()
+    return skin[np.sort(rng.choice(len(skin), count, replace=False, p=share))]
 
 
 def _motion(
