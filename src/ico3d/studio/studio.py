@@ -31,6 +31,8 @@ is as a share of the picture."""
 BODY_MAP = (320, 1.1)
 """Depth maps of a whole person for occlusion: texels along the side, and half of it in metres."""
 BODY_DIRECTIONS = 40
+THROUGH = np.float32(0.12)
+"""Share of the sky's light that wool scatters on to places of a body that see nothing of it."""
 NECK, NECK_BLEND = -0.2, 0.06
 """Height in metres below which occlusion of a whole person is that of the pose, and the height
 above it within which that of the head takes over."""
@@ -201,7 +203,7 @@ class Studio:
         if self._sky is None:
             return head
         middle = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
-        body = self._sky.visible(vertices - middle)
+        body = THROUGH + (1 - THROUGH) * self._sky.visible(vertices - middle)
         return body + self._above * (np.minimum(head, 1.3 * body + 0.2) - body)
 
     def _lamps_on_clothes(self, vertices: np.ndarray, lights: Lights) -> np.ndarray:
