@@ -16,6 +16,7 @@ import ico3d
 from ico3d.capture.decoding import MOST_SIDE, decoded, has_opacity, open_picture, size_of
 from ico3d.capture.formats import open_capture
 from ico3d.capture.vetting import chunks
+from ico3d.creating.looking.examine import refuse_photograph
 from ico3d.errors import CaptureError
 from ico3d.measure.comparison import pictures_of
 
@@ -122,7 +123,7 @@ def test_passes_that_are_not_decoded_do_not_count():
 def test_segments_have_an_end():
     whole, _ = passes(0, progressive=True)
     many = whole[:2] + b"\xff\xe1\0\x02" * 20_000 + whole[2:]
-    with pytest.raises(CaptureError, match="more passes than cameras make"):
+    with pytest.raises(CaptureError, match="more beside its pixels than cameras make"):
         size_of(many, "picture")
 
 
@@ -159,3 +160,29 @@ def test_chunks_have_an_end(monkeypatch):
     empty = struct.pack(">I", 0) + b"IDAT" + struct.pack(">I", zlib.crc32(b"IDAT"))
     assert chunks.has_large_chunks(io.BytesIO(chunks.SIGNATURE + empty * 60))
     assert not chunks.has_large_chunks(io.BytesIO(chunks.SIGNATURE + empty * 40))
+
+
+def test_a_large_file_of_another_kind_is_not_opened(tmp_path, monkeypatch):
+    """Pillow read a WebP whole, twice: a hole of gigabytes became as much memory."""
+    monkeypatch.setattr(Image, "open", lambda *_, **__: pytest.fail("opened"))
+    hole = tmp_path / "0.webp"
+    hole.write_bytes(b"RIFF\0\0\0\0WEBPVP8 ")
+    with hole.open("r+b") as file:
+        file.truncate(chunks.LARGEST_OTHER + 1)
+    with pytest.raises(CaptureError, match="file is larger than is taken"):
+        next(pictures_of(tmp_path, 25.0))
+    refuse_photograph(hole)  # as a film it is opened, or not
+
+
+def with_segments(count, content):
+    whole, _ = passes(0, quality=90)
+    segment = b"\xff\xe1" + struct.pack(">H", len(content) + 2) + content
+    return whole[:2] + segment * count + whole[2:]
+
+
+@pytest.mark.parametrize("count, content", [(300, b"http" + bytes(65_000)), (65, b"Exif\0\0II")])
+def test_a_jpeg_has_only_so_much_beside_its_pixels(monkeypatch, count, content):
+    assert size_of(with_segments(60, content), "picture") == (64, 48)
+    monkeypatch.setattr(Image, "open", lambda *_, **__: pytest.fail("opened"))
+    with pytest.raises(CaptureError, match="more beside its pixels"):
+        size_of(with_segments(count, content), "picture")

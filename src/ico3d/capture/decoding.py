@@ -9,7 +9,7 @@ from typing import BinaryIO
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from ico3d.capture.vetting.chunks import has_large_chunks
+from ico3d.capture.vetting.chunks import has_large_chunks, is_bulky
 from ico3d.capture.vetting.scans import has_many_scans
 from ico3d.common.files import check_regular
 from ico3d.errors import CaptureError
@@ -87,8 +87,10 @@ def open_picture(
     if isinstance(source, Path):
         check_regular(source)
     stream = io.BytesIO(source) if isinstance(source, bytes) else source
+    # Before Pillow, which reads all of it.
+    _refuse_if(is_bulky, source, f"{what}: the picture's file is larger than is taken.")
     beside = f"{what}: the picture has more beside its pixels than cameras make."
-    _refuse_if(has_large_chunks, source, beside)  # before Pillow, which reads all of it
+    _refuse_if(has_large_chunks, source, beside)
     try:
         picture = Image.open(stream, formats=formats)
     except Image.DecompressionBombError as error:

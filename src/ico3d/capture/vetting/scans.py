@@ -11,7 +11,8 @@ PIECE = 1 << 12
 """Bytes that are read at once."""
 _MARK = re.compile(rb"\xff[^\x00\x01\xd0-\xd7\xff]")
 """A mark that begins a segment, or ends the picture; others have no length, or are values."""
-_END, _BEGIN, _SCAN = 0xD9, 0xD8, 0xDA
+END, BEGIN, SCAN = 0xD9, 0xD8, 0xDA
+"""Marks: of a picture's end and beginning, and of a pass over it."""
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _SEQUENTIAL = frozenset((0xC0, 0xC1))
 """Kinds of pictures that are decoded at once where the first pass has all colours."""
@@ -30,17 +31,17 @@ def has_many_scans(file: BinaryIO) -> bool:
         return False
     scans = colours = 0
     for _ in range(MOST_MARKS):
-        mark = _next_mark(file)
-        if mark in (None, _END):
+        mark = next_mark(file)
+        if mark in (None, END):
             return False
-        if mark == _BEGIN:
+        if mark == BEGIN:
             continue
         length = int.from_bytes(file.read(2), "big")
         start = file.tell()
         if mark in _FRAMES:
             about = file.read(6)  # bits, height, width, colours
             colours = about[5] if mark in _SEQUENTIAL and len(about) == 6 else 0
-        elif mark == _SCAN:
+        elif mark == SCAN:
             scans += 1
             if scans > MOST_SCANS:
                 return True
@@ -50,8 +51,8 @@ def has_many_scans(file: BinaryIO) -> bool:
     return True
 
 
-def _next_mark(file: BinaryIO) -> int | None:
-    """The next mark; the file stands behind it. None where there is none."""
+def next_mark(file: BinaryIO) -> int | None:
+    """The next mark of a JPEG picture; the file stands behind it. None where there is none."""
     last = b""
     while piece := file.read(PIECE):
         found = _MARK.search(last + piece)

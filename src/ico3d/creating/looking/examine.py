@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 
-from ico3d.capture.decoding import FORMATS
+from ico3d.capture.decoding import DAMAGED, FORMATS, open_picture
+from ico3d.capture.vetting.chunks import is_bulky
 from ico3d.capture.video import Video, open_video, read_sound
+from ico3d.common.files import check_regular
 from ico3d.creating.looking.advice import Advice, spans_of
 from ico3d.creating.looking.picture_checks import picture_advice
 from ico3d.creating.looking.samples import sampled
@@ -82,9 +83,13 @@ def refuse_photograph(path: Path) -> None:
         CaptureError: If the file is a picture.
     """
     try:
-        with Image.open(path, formats=PHOTOGRAPHS):
+        check_regular(path)
+        with path.open("rb") as file:
+            if is_bulky(file):
+                return  # no picture: videos are as large
+        with open_picture(path, str(path), PHOTOGRAPHS):
             pass
-    except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError):
+    except DAMAGED:
         return  # no picture that Pillow knows
     raise CaptureError.of("photograph", f"{path} is ")
 

@@ -2,10 +2,12 @@
 
 import asyncio
 import contextlib
+import time
 
 import pytest
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse
+from websockets.server import ServerProtocol
 
 from ico3d.chat.serving.network import prompt
 from support.chat.serving import running, serving
@@ -156,6 +158,66 @@ async def test_a_request_has_so_many_headers_and_no_more(port, more, answered):
         writer.write(REQUEST % port + b"a: b\r\n" * (prompt.MOST_HEADERS - 1 + more) + b"\r\n")
         with contextlib.suppress(ConnectionResetError):
             assert (await reader.readline() == b"HTTP/1.1 200 OK\r\n") is answered
+
+
+LISTS = [
+    b"Accept-Encoding: " + b"a;q=1," * 600,
+    b"Connection: " + b"a," * 1500,
+    b"If-None-Match: " + b'"a",' * 700,
+    b"Range: bytes=" + b"1-2," * 700,
+    b"\r\n".join([b"Accept-Encoding: " + b"gzip," * 100] * 5),
+]
+
+
+@pytest.mark.parametrize("lists", LISTS, ids=lambda lists: lists.partition(b":")[0].decode())
+async def test_what_somebody_reads_word_by_word_is_short(port, lists):
+    async with connected(port) as (reader, writer):
+        writer.write(REQUEST % port + lists + b"\r\n\r\n")
+        with contextlib.suppress(ConnectionResetError):
+            assert await reader.read() == b""
+
+
+async def test_a_long_header_that_nobody_reads_is_borne(port):
+    async with connected(port) as (reader, writer):
+        long = b"X-Identity: " + b"a" * 20_000 + b"\r\nAuthorization: Bearer " + b"b" * 8000
+        writer.write(REQUEST % port + long + b"\r\n\r\n")
+        assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+
+
+@pytest.mark.parametrize("more, answered", [(0, True), (1, False)])
+async def test_what_is_asked_for_is_short(port, more, answered):
+    async with connected(port) as (reader, writer):
+        asked = b"/health?" + b"a" * (prompt.LONGEST_TARGET - len(b"/health?") + more)
+        writer.write(b"GET " + asked + HOST + b"\r\n")
+        with contextlib.suppress(ConnectionResetError):
+            assert (await reader.readline() == b"HTTP/1.1 200 OK\r\n") is answered
+
+
+@pytest.mark.parametrize("name", [b"Protocol", b"Extensions"])
+async def test_an_upgrade_costs_little_whatever_it_lists(port, name):
+    async with connected(port) as (reader, writer):
+        lists = (b"Sec-WebSocket-%s: " % name + b"a," * 4000 + b"a\r\n") * 7
+        begun = time.process_time()
+        writer.write(b"GET /echo" + HOST + UPGRADE + lists + b"\r\n")
+        assert (await reader.readline()).startswith(b"HTTP/1.1 101")
+        assert b"Sec-WebSocket-Protocol" not in await reader.readuntil(b"\r\n\r\n")
+        assert time.process_time() - begun < 0.5
+
+
+def test_no_head_that_is_taken_costs_the_libraries_much():
+    """128 heads of one machine may come in one turn of the loop, and more of many."""
+    words = {b"connection": b"a,", b"upgrade": b"a,", b"x-forwarded-for": b"a,", b"host": b"a."}
+    for name, word in words.items():
+        value = word * ((prompt.MOST_PARSED - 200) // len(word))
+        head = b"GET /echo" + HOST + UPGRADE + name + b": " + value + b"a\r\n\r\n"
+        times = []
+        for _ in range(5):
+            server, begun = ServerProtocol(), time.process_time()
+            server.receive_data(head)
+            for request in server.events_received():
+                server.accept(request)
+            times.append(time.process_time() - begun)
+        assert min(times) < 0.01, name
 
 
 async def test_a_header_behind_a_body_claims_nothing(unread):

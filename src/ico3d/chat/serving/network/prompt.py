@@ -23,9 +23,20 @@ PIECES, SMALL = 200, 512
 process time, however small it is, and a chunk of one byte is a piece."""
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 DESCRIPTORS = 1 << 16  # that a server asks the system for
-UNREAD = b"cookie"
-"""A header that ico3d has no use for, but FastAPI parses before every route; older Python takes the
-square of a quoted value's length for it (CVE-2024-7592), seconds for one head."""
+LONGEST_TARGET = 4096  # bytes of what a request asks for, its query included
+UNREAD = (b"cookie", b"sec-websocket-protocol", b"sec-websocket-extensions")
+"""Headers that ico3d has no use for, but libraries parse before every route: cookies, for which
+older Python takes the square of a quoted value's length (CVE-2024-7592), and lists of WebSockets,
+read word by word."""
+PARSED = frozenset(
+    b"accept accept-encoding connection content-length content-type expect host "
+    b"if-modified-since if-none-match if-range origin range te trailer transfer-encoding upgrade "
+    b"x-forwarded-for x-forwarded-proto".split()
+)
+"""Headers of which anybody reads more than whether they equal something."""
+MOST_PARSED = 2048
+"""Bytes of all of these in a request. Heads of many connections come in one turn of the loop, which
+has time for each of them only if none costs more than a millisecond."""
 _open: Counter[str] = Counter()
 
 
@@ -78,21 +89,38 @@ class PromptProtocol(HttpToolsProtocol):
         if self.pipeline:
             self._cut_off("one request at a time, and one more.")
         super().on_message_begin()
-        self._num_headers, self._within_head = 0, True
+        self._num_headers = self._parsed = 0
+        self._within_head = True
+
+    def on_url(self, url: bytes) -> None:
+        """A piece of what is asked for has arrived.
+
+        Raises:
+            ProtocolError: If it is too long; the connection is closed.
+        """
+        super().on_url(url)
+        if len(self.url) > LONGEST_TARGET:
+            self._cut_off(f"asks for more than {LONGEST_TARGET} bytes.")
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """A header has arrived; cookies are left out, for WebSockets, too.
+        """A header has arrived; some are left out, for WebSockets, too.
 
         So are headers behind a body: a proxy that is asked to vouch for an address or a key looks
         at the head alone, and passes on the others as they are.
 
         Raises:
-            ProtocolError: If it is one too many; the connection is closed.
+            ProtocolError: If it is one too many, or there is too much to read in them; the
+                connection is closed.
         """
         self._num_headers += 1
         if self._num_headers > MOST_HEADERS:
             self._cut_off(f"more than {MOST_HEADERS} headers.")
-        if self._within_head and name.lower() != UNREAD:
+        lowered = name.lower()
+        if lowered in PARSED:
+            self._parsed += len(value)
+            if self._parsed > MOST_PARSED:
+                self._cut_off("headers with too much in them.")
+        if self._within_head and lowered not in UNREAD:
             super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
