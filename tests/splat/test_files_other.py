@@ -125,6 +125,34 @@ def test_a_file_that_takes_more_than_the_memory_is_refused(tmp_path, monkeypatch
         read_file(path)
 
 
+@pytest.mark.parametrize(
+    "kind, order, times",
+    [
+        ("float", "binary_little_endian", 8),
+        ("uchar", "binary_little_endian", 32),
+        ("ushort", "binary_big_endian", 16),
+        ("double", "binary_little_endian", 8),
+        ("float", "ascii", 24),
+    ],
+)
+def test_room_is_asked_for_by_what_numbers_become(tmp_path, monkeypatch, kind, order, times):
+    """Numbers of one byte took fifteen times the file where eight were counted."""
+    names = "x y z rot_0 rot_1 rot_2 rot_3 scale_0 scale_1 scale_2 opacity f_dc_0 f_dc_1 f_dc_2"
+    head = f"ply\nformat {order} 1.0\nelement vertex 1000\n"
+    head += "".join(f"property {kind} {name}\n" for name in names.split()) + "end_header\n"
+    path = tmp_path / "a.ply"
+    path.write_bytes(head.encode())
+    with path.open("r+b") as file:
+        file.truncate(80_000)
+    monkeypatch.setattr(memory, "free_memory", lambda: times * 80_000 - 1)
+    with pytest.raises(GaussianFileError, match="the free memory is enough for"):
+        read_file(path)
+    monkeypatch.setattr(memory, "free_memory", lambda: times * 80_000)
+    with pytest.raises(GaussianFileError) as refused:  # damaged, which is found when it is read
+        read_file(path)
+    assert "free memory" not in str(refused.value)
+
+
 def test_missing_files_folders_and_unknown_names_are_refused(tmp_path):
     with pytest.raises(GaussianFileError, match="cannot be read"):
         read_gaussians(tmp_path / "none.ply")

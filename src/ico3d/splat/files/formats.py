@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from ico3d.common.files import MOST_BYTES, read_small, write_atomic
+import numpy as np
+
+from ico3d.common.files import MOST_BYTES, check_regular, read_small, write_atomic
 from ico3d.common.spz.container import GZIP_MAGIC, MAGIC
 from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import GaussianFileError, SettingsError
@@ -12,8 +14,10 @@ from ico3d.splat.files.raw import RawGaussians
 
 _WRITERS = {".ply": standard_ply.write, ".spz": spz.write}
 _HEAD_BYTES = 64 * 32
-_TIMES = 8
-"""How many times its size a file may take while it is read."""
+_TIMES = {"": 8, "splat": 12, "compressed": 16, "text": 24}
+"""How many times its size a file takes at most while it is read and written in another format."""
+_TIMES_OF_BYTES = 32
+"""The same for a PLY whose numbers have one byte each; they become numbers of four."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +47,13 @@ def read_file(path: Path | str) -> GaussianFile:
     """Reads a file of 3D Gaussians and names its format; errors as for `read_gaussians`."""
     path = Path(path)
     try:
-        if lacking := lacks_room(path, _TIMES):
+        check_regular(path)
+        with path.open("rb") as file:
+            head = file.read(ply.MAX_HEADER_BYTES)
+        kind = _recognise(head[:_HEAD_BYTES], path)
+        if lacking := lacks_room(path, _times(kind, head)):
             raise GaussianFileError(f"it {lacking}")
         data = read_small(path, most=MOST_BYTES)
-        kind = _recognise(data[:_HEAD_BYTES], path)
         named, gaussians = _read(kind, data)
         return GaussianFile(named, gaussians.checked())
     except OSError as error:
@@ -66,6 +73,20 @@ def _recognise(head: bytes, path: Path) -> str:
     raise GaussianFileError(
         "no 3D Gaussians that ico3d can read: at byte 0 begins neither PLY nor SPZ nor .splat"
     )
+
+
+def _times(kind: str, head: bytes) -> int:
+    """How many times its size a file of a kind takes, by its first bytes."""
+    if kind != "ply":
+        return _TIMES.get(kind, _TIMES[""])
+    header = ply.parse_header(head)
+    if not header.order:
+        return _TIMES["text"]
+    columns = [kind for element in header.elements.values() for kind in element.properties.values()]
+    if any(compressed_ply.PACKED[0] in element.properties for element in header.elements.values()):
+        return _TIMES["compressed"]
+    size = sum(np.dtype(column).itemsize for column in columns)
+    return max(_TIMES[""], -(-_TIMES_OF_BYTES * len(columns) // max(size, 1)))
 
 
 def _read(kind: str, data: bytes) -> tuple[str, RawGaussians]:
