@@ -10,6 +10,7 @@ from typing import Any
 from openai import DefaultAsyncHttpxClient
 
 from ico3d.chat.services.bounded import NoCookies, ask_plain, bound
+from ico3d.chat.services.tls import client_context
 from ico3d.chat.settings.keys import NONE, OPENAI, goes_here, is_openai, key_for
 
 OWN_HEADERS = ("OpenAI-Organization", "OpenAI-Project")
@@ -39,11 +40,13 @@ def client_options(
     key = key_for(url, key_variable, where) or NONE
     own = [] if is_openai(url) else [_without_openais(key)]
     hooks = {"request": [ask_plain, *own], "response": [partial(bound, most=most)]}
-    secure = not url.startswith("http:")  # else certificates would be read for nothing
+    trusting = not goes_here(url)
+    # Without TLS, certificates would be read for nothing.
+    verify = False if url.startswith("http:") else client_context(trusting)
     client = DefaultAsyncHttpxClient(
         follow_redirects=False,
-        verify=secure,
-        trust_env=not goes_here(url),
+        verify=verify,
+        trust_env=trusting,
         event_hooks=hooks,
         cookies=NoCookies(),
         **http,

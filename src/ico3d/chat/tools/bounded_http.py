@@ -16,6 +16,7 @@ from ico3d.chat.services.bounded import (
     is_events,
     taking_turns,
 )
+from ico3d.chat.services.tls import client_context
 from ico3d.chat.supervision.allowance import Bucket
 
 MESSAGE = Limits(1 << 20, 8_000)
@@ -52,7 +53,7 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
             seconds: Longest silence of an answer to what is sent.
             trust_env: Whether proxies are used that the environment names.
         """
-        super().__init__(trust_env=trust_env)
+        super().__init__(verify=client_context(trust_env), trust_env=trust_env)
         self._seconds = seconds
         self._bytes = Bucket(BYTE_RATE, BYTES_AT_ONCE, time.monotonic)
         self._lines = Bucket(LINE_RATE, LINES_AT_ONCE, time.monotonic)  # of all streams

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+import ssl
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
@@ -57,11 +58,16 @@ async def _read(url: str, key: str, seconds: float) -> bytes:
     """
     data = b""
     headers = {"Authorization": f"Bearer {key}", "Accept-Encoding": "identity"}
-    secure = url.startswith("https:")  # else certificates would be read for nothing, which is slow
+    # Without TLS certificates would be read for nothing, which is slow.
+    verify: ssl.SSLContext | bool = False
+    if url.startswith("https:"):
+        from ico3d.chat.services.tls import client_context
+
+        verify = client_context(trust_env=False)
     options: dict[str, Any] = {"timeout": seconds, "trust_env": False, "headers": headers}
     async with (
         asyncio.timeout(seconds),
-        httpx.AsyncClient(verify=secure, **options) as http,
+        httpx.AsyncClient(verify=verify, **options) as http,
         http.stream("GET", url) as response,
     ):
         response.raise_for_status()
