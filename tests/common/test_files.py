@@ -8,6 +8,7 @@ import pytest
 
 from ico3d.common import files
 from ico3d.common.files import (
+    holds,
     json_of,
     read_object,
     read_small,
@@ -57,6 +58,17 @@ def test_of_anybodys_files_only_small_regular_ones_are_read(tmp_path, monkeypatc
     monkeypatch.setattr(files, "MOST_NOTES", 1)
     with pytest.raises(OSError, match="no small file"):
         read_small(file)
+
+
+def test_what_a_file_holds_is_compared_only_where_it_is_as_long(tmp_path, monkeypatch):
+    file = tmp_path / "plan.json"
+    assert not holds(file, b"") and not holds(tmp_path, b"")
+    file.write_bytes(b"abc")
+    assert holds(file, b"abc") and not holds(file, b"abd")
+    with file.open("r+b") as hole:
+        hole.truncate(1 << 33)
+    monkeypatch.setattr(Path, "read_bytes", lambda _: pytest.fail("read"))
+    assert not holds(file, b"abc")
 
 
 def test_a_small_file_takes_little_memory_whatever_may_be_read(tmp_path):

@@ -138,6 +138,13 @@ def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes
         return opened.read(about.st_size)  # room for as many bytes is made at once
 
 
+def holds(file: Path, content: bytes) -> bool:
+    """Whether a file, which may be anybody's, holds exactly this; False if there is none."""
+    if not file.is_file() or file.stat().st_size != len(content):
+        return False
+    return file.read_bytes() == content
+
+
 def check_regular(file: Path) -> None:
     """Refuses what is there and no regular file: a pipe is waited for, and a device has no end.
 

@@ -19,7 +19,7 @@ from ico3d.capture.capture import Sound
 from ico3d.capture.decoding import open_picture
 from ico3d.capture.synthetic import FORMAT, VERSION
 from ico3d.common.camera import Camera
-from ico3d.common.files import write_atomic
+from ico3d.common.files import holds, write_atomic
 from ico3d.common.sound import wav_bytes
 from ico3d.errors import SettingsError
 from ico3d.studio.acting.embody import embodied
@@ -207,7 +207,7 @@ def _begin(recording: Recording, out: Path) -> None:
     """Marks a folder as being recorded, unless it is marked with the same settings already."""
     settings = json.dumps(asdict(recording)).encode()
     mark = out / UNFINISHED
-    if mark.is_file() and mark.read_bytes() == settings:
+    if holds(mark, settings):
         return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise SettingsError(f"{out} holds something already: name a new folder.")

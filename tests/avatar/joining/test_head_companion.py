@@ -1,6 +1,7 @@
 """The head as the companion of a body's training."""
 
 import pickle
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from ico3d.avatar.avatar import PLACEMENT, Placement, save_placement
 from ico3d.avatar.joining.companion import JITTER, SEAM, HeadSource
 from ico3d.avatar.joining.driving import head_poses
 from ico3d.avatar.joining.similarity import moved
+from ico3d.common.unpacking import memory
 from ico3d.errors import ModelError
 from ico3d.training.checkpoint import save_tensors
 from support.avatars.planted_person import ABROAD, FRAMES, face
@@ -59,6 +61,21 @@ def test_a_file_without_a_seam_is_refused(source, seam):
     save_tensors(source.folder / SEAM, seam, {})
     with pytest.raises(ModelError, match=r"seam\.safetensors holds no positions"):
         source.open(CPU)
+
+
+def test_a_hash_of_large_files_takes_no_memory(source, monkeypatch):
+    """What a folder holds that somebody else began is hashed before it is loaded."""
+    before = source.about()
+    model = source.folder / "head" / "model.safetensors"
+    with model.open("r+b") as hole:
+        hole.truncate(64 << 20)
+    tracemalloc.start()
+    assert source.about() != before
+    assert tracemalloc.get_traced_memory()[1] < 8 << 20
+    tracemalloc.stop()
+    monkeypatch.setattr(memory, "free_memory", lambda: (64 << 20) - 1)
+    with pytest.raises(ModelError, match="the free memory is enough for"):
+        source.about()
 
 
 def test_places_are_forbidden_in_the_world(source, placement):

@@ -11,6 +11,7 @@ from torch import Tensor
 from ico3d.avatar.avatar import HEAD, PLACEMENT, Placement, load_placement
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.face.region import HeadRegion
+from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians
@@ -19,6 +20,8 @@ from ico3d.training.finite import all_finite
 
 SEAM = "seam.safetensors"
 """File with positions (P, 3) near the head's border, in the space of the head's model."""
+PIECE = 1 << 20
+"""Bytes of a file that are read at once while it is hashed."""
 JITTER = 0.004
 """Standard deviation in metres of first points about a position near the border."""
 
@@ -50,7 +53,11 @@ class HeadSource:
         return HeadCompanion(head, placement, expressions, seam, self)
 
     def about(self) -> dict:
-        """Settings, and a hash of head, placement and seam: what the training depends on."""
+        """Settings, and a hash of head, placement and seam: what the training depends on.
+
+        Raises:
+            ModelError: If a file is larger than could be loaded.
+        """
         digest = hashlib.sha256()
         head = self.folder / HEAD
         for file in (
@@ -59,7 +66,11 @@ class HeadSource:
             self.folder / PLACEMENT,
             self.folder / SEAM,
         ):
-            digest.update(file.read_bytes())
+            if lacking := lacks_room(file, 1):
+                raise ModelError(f"{file} {lacking}.")
+            with file.open("rb") as opened:
+                while piece := opened.read(PIECE):
+                    digest.update(piece)
         settings = {"border_points": self.border_points, "pruning": self.pruning}
         return settings | {"head": digest.hexdigest()}
 

@@ -13,7 +13,7 @@ from ico3d.body.planning.flow import clip_flow
 from ico3d.body.planning.windows import Window, cut
 from ico3d.body.settings import Windows
 from ico3d.capture.capture import Capture
-from ico3d.common.files import write_atomic
+from ico3d.common.files import holds, write_atomic
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 """Characters of the motion curve in the terminal, from least to most."""
@@ -81,7 +81,7 @@ def save_plan(plan: Plan, path: Path) -> None:
 
 def is_saved(plan: Plan, path: Path) -> bool:
     """Whether a file holds exactly this plan."""
-    return path.is_file() and path.read_bytes() == _written(plan)
+    return holds(path, _written(plan))
 
 
 def _written(plan: Plan) -> bytes:

@@ -65,6 +65,7 @@ class Handshake(asyncio.Protocol):
         with contextlib.suppress(OSError):  # of a client that gives up, or speaks no TLS
             line = await secured
         self._uncount()
+        self._task = None  # which refers to this connection: many are begun and left
         if line is None or line.is_closing():
             transport.abort()
             return
