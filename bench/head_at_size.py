@@ -1,0 +1,98 @@
+"""How near a head's pictures are to its recording, both at another size.
+
+    python bench/head_at_size.py HEAD CAPTURE --size 512
+
+Metrics are those of `ico3d evaluate`, on the same unseen frames. Recorded pictures, masks and
+landmarks are scaled down by areas; the head is drawn by cameras of that size.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import tyro
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
+from ico3d.capture.parts.held_out import PartOfCapture, scored_pictures
+from ico3d.capture.parts.trained_on import check_untrained
+from ico3d.capture.parts.wrapped import WrappedCapture
+from ico3d.cli import run_script
+from ico3d.head.model_folder import TrainedHead
+from ico3d.measure.head import evaluate_head
+
+
+class Smaller(WrappedCapture):
+    """A capture of a head with pictures of another height."""
+
+    image_bytes = Capture.image_bytes
+    mask_bytes = Capture.mask_bytes
+    head_mask_bytes = Capture.head_mask_bytes
+
+    def __init__(self, capture: Capture, height: int):
+        """Scales all cameras to a height in pixels."""
+        super().__init__(capture)
+        self.cameras = tuple(
+            camera.resized(round(height * camera.width / camera.height), height)
+            for camera in capture.cameras
+        )
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The recorded picture, smaller."""
+        return self._small(camera, self.whole.image(camera, frame))
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The mask, smaller."""
+        return self._small(camera, self.whole.mask(camera, frame))
+
+    def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The mask for `psnr_mask`, smaller."""
+        return self._small(camera, self.whole.head_mask(camera, frame))
+
+    def background(self, camera: int) -> np.ndarray | None:
+        """The clean plate, smaller."""
+        return self._small(camera, self.whole.background(camera))
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) landmarks in smaller pixels."""
+        found, large = self.whole.landmarks(camera, frame), self.whole.cameras[camera]
+        small = self.cameras[camera]
+        size = small.width / large.width, small.height / large.height
+        return None if found is None else (found * size).astype(found.dtype)
+
+    def _small(self, camera: int, picture: np.ndarray | None) -> np.ndarray | None:
+        if picture is None:
+            return None
+        size = self.cameras[camera].width, self.cameras[camera].height
+        return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What to measure.
+
+    Attributes:
+        head: Folder of a trained head.
+        capture: Its recording.
+        size: Height of the pictures in pixels.
+    """
+
+    head: tyro.conf.Positional[Path]
+    capture: tyro.conf.Positional[Path]
+    size: int = 512
+
+    def run(self) -> None:
+        """Prints the metrics."""
+        head, capture = TrainedHead.load(self.head), open_capture(self.capture)
+        cameras, frames = scored_pictures(capture, "test")
+        check_untrained(head.records, capture, cameras, frames)
+        part = PartOfCapture(Smaller(capture, self.size), cameras, frames)
+        for name, value in evaluate_head(head, part, frames, None).items():
+            if isinstance(value, float):
+                print(f"{name:16} {value:.5g}")
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(Bench))
