@@ -1,6 +1,6 @@
 """How near a head's pictures are to its recording, both at another size.
 
-    python bench/head_at_size.py HEAD CAPTURE --size 512
+    python bench/heads/at_size.py HEAD CAPTURE --size 512
 
 Metrics are those of `ico3d evaluate`, on the same unseen frames. Recorded pictures, masks and
 landmarks are scaled down by areas; the head is drawn by cameras of that size.
