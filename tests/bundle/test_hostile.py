@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from ico3d.bundle import archive, limits
 from ico3d.bundle.format import Bundle
 from ico3d.errors import BundleError
 
@@ -257,3 +258,10 @@ def test_a_bomb_takes_no_memory(tmp_path, make):
 
 def test_maxrss_is_in_kilobytes_here():
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss > 10_000
+
+
+@pytest.mark.parametrize("name", ["LICENSES.txt", "thumbnail.png"])
+def test_what_lies_beside_the_figure_is_small(tmp_path, name):
+    archive._check_sizes({name: limits.MAX_ASIDE_BYTES, "head.safetensors": 1 << 27}, tmp_path)
+    with pytest.raises(BundleError, match=f"{name}: is larger than"):
+        archive._check_sizes({name: limits.MAX_ASIDE_BYTES + 1}, tmp_path)

@@ -1,5 +1,8 @@
 """What is refused in speech.onnx before a runtime sees it."""
 
+import itertools
+import tracemalloc
+
 import numpy as np
 import onnx
 import pytest
@@ -7,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper, numpy_helper
 
+from ico3d.bundle import onnx_check
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.errors import BundleError
 from support.bundles.random_bundle import speech_graph
@@ -113,3 +117,45 @@ def test_damage_is_refused_or_harmless(place, change):
         check(bytes(data))
     except BundleError as error:
         assert str(error).startswith("speech.onnx: ")
+
+
+def fields(number: int, count: int) -> bytes:
+    """Empty fields of a number, of two bytes each."""
+    return bytes([number << 3 | 2, 0]) * count
+
+
+def test_a_graph_of_millions_of_empty_fields_takes_no_memory(model):
+    """Each of them was kept: 100 bytes of memory for two of the file."""
+    node = fields(7, 1_000_000)  # names of the operator's domain
+    size = len(node)
+    length = b""
+    while size > 127:
+        length += bytes([size & 127 | 128])
+        size >>= 7
+    length += bytes([size])
+    graph = b"\x0a" + length + node
+    size, head = len(graph), b""
+    while size > 127:
+        head += bytes([size & 127 | 128])
+        size >>= 7
+    data = b"\x3a" + head + bytes([size]) + graph
+    tracemalloc.start()
+    with pytest.raises(BundleError, match="is not an ONNX model"):
+        check(data)
+    assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    tracemalloc.stop()
+
+
+def test_a_graph_of_ten_thousands_of_operators_is_refused(model):
+    last = model.graph.output[0].name
+    for number in range(30_000):
+        model.graph.node.append(helper.make_node("Relu", [last], [f"r{number}"]))
+    refused(model, "is not an ONNX model")
+
+
+def test_the_last_of_several_names_counts(model):
+    node = model.graph.node[0]
+    twice = node.SerializeToString() + b"\x22\x04Loop"  # another operator's name
+    changed = onnx.NodeProto.FromString(twice)
+    assert changed.op_type == "Loop"
+    assert onnx_check._text(memoryview(twice), itertools.count(), 4) == "Loop"

@@ -1,12 +1,13 @@
-"""TOML of strangers: what Python's parser takes minutes for is refused, long texts are not."""
+"""TOML and JSON of strangers: what parsers take minutes or gigabytes for is refused."""
 
+import json
 import time
 
 import pytest
 
 from ico3d.bundle.persona import read_persona
 from ico3d.chat.settings.conversation import MOST_BYTES, read_settings
-from ico3d.common.typed import parse_toml
+from ico3d.common.typed import loose_json, parse_toml
 from ico3d.errors import BundleError, SettingsError
 
 
@@ -37,3 +38,11 @@ def test_settings_without_an_end_are_not_read(tmp_path):
     file.write_bytes(b"#" * (MOST_BYTES + 1))
     with pytest.raises(SettingsError, match="is larger than 1048576 bytes"):
         read_settings(file)
+
+
+@pytest.mark.parametrize("value", ["[]", '{"a":1}'])
+def test_json_of_millions_of_values_is_not_parsed(monkeypatch, value):
+    """Parsed, a file of 62 MB took 2 GB."""
+    monkeypatch.setattr(json, "loads", lambda _: pytest.fail("parsed"))
+    with pytest.raises(ValueError, match="more than 4,000,000 values"):
+        loose_json(("[" + 2_100_000 * (value + ",") + "0]").encode())

@@ -187,8 +187,10 @@ def _check_names(names: list[str], path: Path) -> None:
 
 def _check_sizes(sizes: Mapping[str, int], path: Path) -> None:
     for name, size in sizes.items():
-        if size > limits.MAX_FILE_BYTES:
-            raise BundleError(f"{name}: is larger than {limits.MAX_FILE_BYTES} bytes.")
+        aside = name.endswith((".txt", ".png"))
+        most = limits.MAX_ASIDE_BYTES if aside else limits.MAX_FILE_BYTES
+        if size > most:
+            raise BundleError(f"{name}: is larger than {most} bytes.")
     if sum(sizes.values()) > limits.MAX_BUNDLE_BYTES:
         raise BundleError(f"{path.name}: is larger than {limits.MAX_BUNDLE_BYTES} bytes.")
 

@@ -4,6 +4,8 @@ from ico3d.rig.pose_regression import MOST_KNOWN
 
 MAX_FILES = 256
 MAX_FILE_BYTES = 256 << 20
+MAX_ASIDE_BYTES = 4 << 20
+"""Bytes of a file that is no part of the person's figure: licences, the thumbnail."""
 MAX_BUNDLE_BYTES = 512 << 20
 MAX_MANIFEST_BYTES = 1 << 20
 MAX_GAUSSIANS = 1_000_000

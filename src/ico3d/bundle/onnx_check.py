@@ -4,6 +4,7 @@ The check reads protobuf's wire format directly, so that a server needs no onnx 
 numbers are those of onnx.proto (ModelProto, GraphProto, NodeProto, AttributeProto, TensorProto).
 """
 
+import itertools
 from collections.abc import Iterator
 
 from ico3d.errors import BundleError
@@ -40,6 +41,10 @@ There are no loops and no random numbers among them.
 """
 
 Value = int | memoryview
+Count = Iterator[int]
+MOST_FIELDS = 100_000
+"""Fields that are looked at, some ten for each operator of a graph and five for each weight: empty
+ones have two bytes, and a runtime takes 30 kB for each operator."""
 
 
 OPTIONAL_INPUT = "told"
@@ -61,66 +66,79 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
             or it refers to other files.
     """
     try:
+        count = itertools.count()
         graphs: list[memoryview] = []
-        for field, value in _fields(memoryview(data)):
+        for field, value in _fields(memoryview(data), count):
             if field == _FUNCTIONS:
                 raise BundleError(f"{name}: defines functions of its own.")
             if field == _GRAPH:
                 graphs.append(_bytes(value))
         if len(graphs) != 1:
             raise ValueError("no graph")
-        _check_graph(graphs[0], name, input_name, output_name)
+        _check_graph(graphs[0], count, name, input_name, output_name)
     except (ValueError, IndexError) as error:
         raise BundleError(f"{name}: is not an ONNX model.") from error
 
 
-def _check_graph(graph: memoryview, name: str, input_name: str, output_name: str) -> None:
+def _check_graph(
+    graph: memoryview, count: Count, name: str, input_name: str, output_name: str
+) -> None:
     names: dict[int, list[str]] = {_INPUT: [], _OUTPUT: []}
     weights: set[str] = set()
-    for field, value in _fields(graph):
+    for field, value in _fields(graph, count):
         if field == _NODE:
-            _check_node(_bytes(value), name)
+            _check_node(_bytes(value), count, name)
         elif field == _INITIALIZER:
-            _check_tensor(_bytes(value), name)
-            weights.add(_text(_bytes(value), _TENSOR_NAME))
+            _check_tensor(_bytes(value), count, name)
+            weights.add(_text(_bytes(value), count, _TENSOR_NAME))
         elif field == _SPARSE:
             raise BundleError(f"{name}: has sparse weights.")
         elif field in names:
-            names[field].append(_text(_bytes(value), _NAME))
+            names[field].append(_text(_bytes(value), count, _NAME))
     if OPTIONAL_INPUT in weights and names[_INPUT][1:] == [OPTIONAL_INPUT]:
         del names[_INPUT][1]
     if names != {_INPUT: [input_name], _OUTPUT: [output_name]}:
         raise BundleError(f"{name}: must lead from '{input_name}' to '{output_name}'.")
 
 
-def _check_node(node: memoryview, name: str) -> None:
-    if _text(node, _DOMAIN) not in ("", "ai.onnx") or _text(node, _OP_TYPE) not in OPERATORS:
-        raise BundleError(f"{name}: uses the operator {_text(node, _OP_TYPE)[:40]!r}.")
-    for field, value in _fields(node):
+def _check_node(node: memoryview, count: Count, name: str) -> None:
+    operator = _text(node, count, _OP_TYPE)
+    if _text(node, count, _DOMAIN) not in ("", "ai.onnx") or operator not in OPERATORS:
+        raise BundleError(f"{name}: uses the operator {operator[:40]!r}.")
+    for field, value in _fields(node, count):
         if field == _ATTRIBUTE:
-            for inner, part in _fields(_bytes(value)):
+            for inner, part in _fields(_bytes(value), count):
                 if inner in _SUBGRAPHS:
                     raise BundleError(f"{name}: holds a graph within a graph.")
                 if inner == _TENSOR:
-                    _check_tensor(_bytes(part), name)
+                    _check_tensor(_bytes(part), count, name)
 
 
-def _check_tensor(tensor: memoryview, name: str) -> None:
-    for field, value in _fields(tensor):
+def _check_tensor(tensor: memoryview, count: Count, name: str) -> None:
+    for field, value in _fields(tensor, count):
         if field == _EXTERNAL or (field == _LOCATION and value):
             raise BundleError(f"{name}: keeps weights in another file.")
 
 
-def _text(message: memoryview, wanted: int) -> str:
+def _text(message: memoryview, count: Count, wanted: int) -> str:
     """The last string in a field, which is the one that counts; empty where there is none."""
-    found = [_bytes(value) for field, value in _fields(message) if field == wanted]
-    return bytes(found[-1]).decode() if found else ""
+    found = b""
+    for field, value in _fields(message, count):
+        if field == wanted:
+            found = _bytes(value)
+    return bytes(found).decode()
 
 
-def _fields(message: memoryview) -> Iterator[tuple[int, Value]]:
-    """The (field number, value) pairs of a message; 32- and 64-bit numbers stay bytes."""
+def _fields(message: memoryview, count: Count) -> Iterator[tuple[int, Value]]:
+    """The (field number, value) pairs of a message; 32- and 64-bit numbers stay bytes.
+
+    Raises:
+        ValueError: If the message is damaged, or it is one field too many of the model.
+    """
     position = 0
     while position < len(message):
+        if next(count) >= MOST_FIELDS:
+            raise ValueError("too many fields")
         key, position = _varint(message, position)
         kind = key & 7
         if kind == 0:

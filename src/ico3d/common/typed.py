@@ -12,6 +12,8 @@ from functools import cache
 from typing import Annotated, Any, Literal, TypeVar, cast
 
 T = TypeVar("T")
+MOST_VALUES = 4_000_000
+"""Lists, objects and their entries of a text of JSON: parsed, each takes up to 70 bytes."""
 MOST_PARTS = 100
 """Parts of a dotted key of TOML: Python's parser takes minutes for one of tens of thousands."""
 NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
@@ -312,9 +314,11 @@ def loose_json(data: bytes | str) -> Any:
     """Parses JSON that may be anybody's, as leniently as Python: NaN may be there, keys repeat.
 
     Raises:
-        ValueError: If it is no JSON in UTF-8, or nested too deep.
+        ValueError: If it is no JSON in UTF-8, nested too deep, or has more than `MOST_VALUES`.
     """
     text = data if isinstance(data, str) else data.decode("utf-8-sig")
+    if text.count("[") + text.count("{") + text.count(",") > MOST_VALUES:
+        raise ValueError(f"it has more than {MOST_VALUES:,} values")
     try:
         return json.loads(text)
     except RecursionError as error:

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import loose_json
+from ico3d.common.unpacking.heads import check_head
 from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import ModelError
 from ico3d.training.finite import all_finite
@@ -272,6 +273,7 @@ def _opened(path: Path, advice: str = ": train again") -> Iterator[safe_open]:
     try:
         if not path.is_file():
             raise ModelError(f"there is no model file at {path}.")
+        check_head(path)
         with safe_open(path, framework="pt") as file:
             yield file
     except (SafetensorError, *DAMAGED) as error:

@@ -1,6 +1,7 @@
 """The OpenAI SDK talks to our modules, which are the real offline three over real HTTP."""
 
 import asyncio
+import codecs
 import contextlib
 import io
 import json
@@ -317,3 +318,14 @@ async def test_a_request_of_thousands_of_tools_or_messages_is_refused():
         for ask in ({"messages": [said], "tools": [tool] * 129}, {"messages": [said] * 10_001}):
             answer = await http.post("v1/chat/completions", json=ask)
             assert answer.status_code == 400 and "at most" in answer.json()["error"]["message"]
+
+
+def test_no_name_of_a_coding_is_looked_up(monkeypatch):
+    """Python keeps each that it did not find for ever: 2 kB a request, without a key."""
+    monkeypatch.setattr(codecs, "lookup", lambda name: pytest.fail(name))
+    form = "multipart/form-data; boundary=x"
+    for charset in ("utf-8", "UTF8", "Utf_8"):
+        assert door.is_plain_form(f"{form}; charset={charset}")
+    assert door.is_plain_form(form) and door.is_plain_form("application/json; charset=latin-1")
+    for charset in ("utf-7", "%", "a" * 2000):
+        assert not door.is_plain_form(f"{form}; charset={charset}")

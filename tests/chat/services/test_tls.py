@@ -6,12 +6,14 @@ from datetime import UTC, datetime
 
 import httpx2
 import pytest
+from aiohttp.resolver import DefaultResolver
 from httpcore2._backends.anyio import AnyIOStream
 
 from ico3d.chat.services import client
 from ico3d.chat.services.tls import client_context
 from ico3d.chat.serving.network.certificates import own_certificate
 from ico3d.chat.tools.bounded_http import BoundedTransport
+from ico3d.chat.tools.http import BoundedConnector
 
 BODY = b'{"object": "list", "data": []}'
 HEAD = (
@@ -113,3 +115,24 @@ def test_what_is_read_into_a_buffer_is_as_ever(certificate):
     server.write(b"abc")
     room = bytearray(8)
     assert near.read(8, room) == 3 and room[:3] == b"abc"
+
+
+def test_no_server_names_the_numbers_of_an_exchange():
+    """A prime of 10,000 bits kept a client, and with it everybody, for 0.6 s."""
+    session = aiohttp_context()
+    for context in (client_context(), session):
+        names = [cipher["name"] for cipher in context.get_ciphers()]
+        assert names and all(name.startswith(("TLS_", "ECDHE-")) for name in names)
+        assert context.verify_mode == ssl.CERT_REQUIRED and context.check_hostname
+
+
+def aiohttp_context() -> ssl.SSLContext:
+    """What calls of tools are made with."""
+
+    async def made():
+        connector = BoundedConnector(DefaultResolver())
+        context = connector._ssl
+        await connector.close()
+        return context
+
+    return asyncio.run(made())

@@ -1,5 +1,6 @@
 """Reads the talking-portrait layout, written by ico3d or by other programs."""
 
+import io
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -198,7 +199,7 @@ class TalkingPortrait(RecordedCapture):
         table = _reading(
             path,
             lambda: np.loadtxt(
-                text.splitlines(), delimiter=",", skiprows=1, usecols=wanted, ndmin=2
+                io.StringIO(text), delimiter=",", skiprows=1, usecols=wanted, ndmin=2
             ),
         )
         return dict(zip(AU_COLUMNS, table.T, strict=True))

@@ -1,7 +1,6 @@
 """Admission of requests to a module: key, size, and number at a time."""
 
 import asyncio
-import codecs
 import hmac
 
 from python_multipart.multipart import parse_options_header
@@ -19,6 +18,8 @@ So is an answer of which nothing is read for as long.
 """
 PACE = 8_000
 """Bytes per second, beyond the first seconds, at which a request has to come: it holds a place."""
+UTF_8 = ("utf-8", "utf8", "utf_8")
+"""Spellings of the one coding in which forms are read."""
 BROKEN, BUSY = 1008, 1013  # WebSocket close codes
 
 
@@ -118,10 +119,8 @@ def is_plain_form(content_type: str | None) -> bool:
     """Whether a request's form, if it is one, is in UTF-8: others may take quadratic time."""
     kind, options = parse_options_header(content_type)  # as Starlette reads it
     charset = options.get(b"charset", b"utf-8").decode("latin-1")
-    try:
-        return kind != b"multipart/form-data" or codecs.lookup(charset).name == "utf-8"
-    except (LookupError, ValueError):
-        return False
+    # Not by codecs.lookup: Python keeps each name that it did not find for ever.
+    return kind != b"multipart/form-data" or charset.lower() in UTF_8
 
 
 def too_large(megabytes: float) -> str:

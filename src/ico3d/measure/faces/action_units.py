@@ -3,6 +3,7 @@
 import csv
 import io
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ LOWER = ("AU10", "AU12", "AU14", "AU15", "AU17", "AU20", "AU23", "AU25", "AU26")
 UPPER = ("AU01", "AU02", "AU04", "AU05", "AU06", "AU07", "AU09", "AU45")
 """Action units of the upper face among those whose intensity OpenFace estimates."""
 
+MOST_ROWS = 100_000
+"""Rows that are read: an hour of video at 25 frames per second has 90,000."""
 _FRAME, _SUCCESS = "frame", "success"
 
 
@@ -59,7 +62,8 @@ def read_action_units(path: Path) -> ActionUnits:
     """
     try:
         text = read_small(path).decode("utf-8-sig")
-        rows = list(csv.reader(io.StringIO(text, newline=""), skipinitialspace=True))
+        lines = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
+        rows = list(islice((row for row in lines if row), MOST_ROWS))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CaptureError(f"{path} cannot be read as a table of OpenFace: {error}.") from None
     names = [name.strip() for name in rows[0]] if rows else []
@@ -68,7 +72,7 @@ def read_action_units(path: Path) -> ActionUnits:
     if lacking:
         raise CaptureError(f"{path} is no table of OpenFace: it has no column {lacking[0]}.")
     try:
-        table = np.array([row for row in rows[1:] if row], np.float64)  # (T, columns)
+        table = np.array(rows[1:], np.float64)  # (T, columns)
     except ValueError:
         raise CaptureError(f"{path} has a row that is not {len(names)} numbers.") from None
     if table.ndim != 2 or table.shape[1] != len(names):

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import ssl
 
 import pytest
 
@@ -52,3 +53,19 @@ async def test_what_is_no_handshake_is_closed_and_others_are_served(secured):
     assert await is_closed(reader, 5)
     writer.close()
     assert await asyncio.gather(*(health(port, trust) for _ in range(30))) == [200] * 30
+
+
+@pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
+async def test_clients_as_they_are_come_in_and_those_with_costly_keys_alone_do_not(
+    secured, version
+):
+    """OpenSSL's own choice of groups has some that take 91 ms of the loop for a hello."""
+    port, trust = secured
+    trust.minimum_version = trust.maximum_version = version
+    _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=trust)
+    writer.close()
+    trust.set_ecdh_curve("secp384r1")
+    if version == ssl.TLSVersion.TLSv1_2:
+        trust.set_ciphers("ECDHE+AESGCM")
+    with pytest.raises((ssl.SSLError, ConnectionError)):
+        await asyncio.open_connection("127.0.0.1", port, ssl=trust)

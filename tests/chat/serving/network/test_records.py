@@ -83,6 +83,14 @@ async def test_nobody_begins_a_second_handshake():
     assert (await fed(record(HANDSHAKE, 4) * (records.MOST_HANDSHAKE + 1))).closed
 
 
+async def test_a_hello_is_as_long_as_those_of_browsers_and_no_longer():
+    """OpenSSL looks for each key in a hello through all of its groups."""
+    half = record(HANDSHAKE, records.LONGEST_HANDSHAKE // 2)
+    assert not (await fed(half * 2)).closed
+    assert (await fed(half * 2 + record(HANDSHAKE, 1))).closed
+    assert (await fed(record(HANDSHAKE, 16_384))).closed
+
+
 @pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
 async def test_a_server_ends_who_sends_crumbs_in_records(secured, monkeypatch, version):
     monkeypatch.setattr(records, "AT_ONCE", 300.0)

@@ -11,6 +11,9 @@ from ico3d.chat.supervision.allowance import Bucket
 HEAD = 5  # bytes: type, version, length
 CHANGE_CIPHER, HANDSHAKE = 20, 22  # types, in the clear whatever the records hold
 MOST_HANDSHAKE = 16  # records of a client's handshake: some clients cut their hello into pieces
+LONGEST_HANDSHAKE = 8192
+"""Bytes of a client's handshake: hellos of browsers have 2 kB, and may come twice. OpenSSL looks
+for each key in one through all of its groups: 20 ms for 64 kB."""
 LARGE = 4096  # bytes of a record that costs nothing; a smaller one costs what it lacks
 RATE, AT_ONCE = 300.0, 2000.0
 """Empty records of a second, and at once: a page may send as many messages after a stall."""
@@ -33,7 +36,7 @@ class CountedRecords(asyncio.Protocol):
         self._allowed = Bucket(RATE, AT_ONCE, asyncio.get_running_loop().time)
         self._head = b""  # of a record whose head has come in part
         self._left = 0  # bytes of a record whose body has come in part
-        self._handshakes, self._finished = 0, False
+        self._handshakes, self._handshake_bytes, self._finished = 0, 0, False
 
     def data_received(self, data: bytes) -> None:
         """Hands on what has come, unless it holds too many records."""
@@ -76,19 +79,23 @@ class CountedRecords(asyncio.Protocol):
                 self._head = head
                 break
             self._head, size = b"", int.from_bytes(head[3:5], "big")
-            if not self._allowed.take(max(0.0, 1 - size / LARGE)) or not self._is_in_turn(head[0]):
+            if not self._allowed.take(max(0.0, 1 - size / LARGE)):
+                return False
+            if not self._is_in_turn(head[0], size):
                 return False
             at += size
         self._left = max(0, at - len(data))
         return True
 
-    def _is_in_turn(self, kind: int) -> bool:
-        """Whether a record of this type may come now."""
+    def _is_in_turn(self, kind: int, size: int) -> bool:
+        """Whether a record of this type and size may come now."""
         if kind == CHANGE_CIPHER:
             self._finished = True
         if kind != HANDSHAKE:
             return True
         self._handshakes += 1
+        self._handshake_bytes += size
         if self._finished:  # the last of a handshake
             self._handshakes = max(self._handshakes, MOST_HANDSHAKE)
-        return self._handshakes <= MOST_HANDSHAKE
+        few = self._handshake_bytes <= LONGEST_HANDSHAKE
+        return few and self._handshakes <= MOST_HANDSHAKE
