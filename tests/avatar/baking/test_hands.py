@@ -39,12 +39,12 @@ def darkened(body, which):
 
 def test_shaded_fingers_are_as_bright_as_the_palm(arm):
     body, along = arm
-    fingers = along > 0.09
+    fingers = along > 0.07
     found = evened(darkened(body, fingers)).color_logits.astype(np.float32)
-    inside = along > 0.09 + 2 * AROUND
+    inside = along > 0.07 + 2 * AROUND
     assert inside.sum() > 100
     np.testing.assert_allclose(found[inside], np.tile(SKIN, (inside.sum(), 1)), atol=0.02)
-    palm = (along > 0.04) & (along < 0.09 - 2 * AROUND)
+    palm = (along > 0.04) & (along < 0.07 - 2 * AROUND)
     np.testing.assert_allclose(found[palm], np.tile(SKIN, (palm.sum(), 1)), atol=0.01)
 
 

@@ -16,7 +16,8 @@ from ico3d.errors import SettingsError
 from ico3d.motion.roles import Cast, cast
 
 LIT = 0.65
-"""Quantile of a hand's brightness, in mean logits of r, g, b, that counts as skin in light."""
+"""Quantile of a hand's brightness, in mean logits of r, g, b, that counts as skin in light: by area,
+as fingers have the most Gaussians by number."""
 AROUND = 0.005
 """Radius in metres in which brightness is shade; what is smaller than that is detail."""
 KEPT = 0.4
@@ -43,7 +44,8 @@ def evened(baked: BakedSkinned) -> BakedSkinned:
         if len(skin) < LEAST:
             continue
         bright = logits[skin].mean(1)
-        shade = np.maximum(np.quantile(bright, LIT) - _around(baked, skin, bright), 0)
+        lit = _quantile(bright, _areas(baked, skin))
+        shade = np.maximum(lit - _around(baked, skin, bright), 0)
         logits[skin] += (shade * share[skin])[:, None]
         scales[:, 1] *= 1 - (1 - KEPT) * share
     return replace(
@@ -61,6 +63,19 @@ def _share_of_hand(baked: BakedSkinned, roles: Cast, side: str) -> np.ndarray:
     hand = roles.below(f"{side}_wrist")[baked.joints]  # (N, 4)
     carried = hand * (baked.weights / np.float32(WEIGHT_UNIT))  # (N, 4)
     return carried.sum(1) * beyond
+
+
+def _areas(baked: BakedSkinned, some: np.ndarray) -> np.ndarray:
+    """(M,) areas that M Gaussians cover, by their two longer axes and their opacity."""
+    log_scales = np.sort(baked.log_scales[some].astype(np.float64), axis=1)  # (M, 3)
+    return np.exp(log_scales[:, 1:].sum(axis=1)) * baked.opacities[some]
+
+
+def _quantile(values: np.ndarray, weights: np.ndarray) -> float:
+    """The value up to which `LIT` of the weight lies, of (M,) values."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(below, LIT * below[-1])])
 
 
 def _around(baked: BakedSkinned, skin: np.ndarray, bright: np.ndarray) -> np.ndarray:
