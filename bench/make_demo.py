@@ -163,9 +163,7 @@ class Demo:
         (work / "avatar" / CUTS).write_text(no_clips)
         files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
         notices = ("--licences", *self.licences, "--made-by", MAKER)
-        # In the recording eyes stay on the visitor while the head turns by 34°; a bundle's look
-        # where the head does, for which bake's bound of a whole person leaves no room.
-        ico3d("bake", *files, "--strip", work / "strip.png", *notices, "--force")
+        ico3d("bake", *files, "--strip", work / "strip.png", *notices)
         write_finished(self.out)
         ico3d("render", self.out, work / "gestures.mp4", "--gestures", *GESTURES)
         check(self.out)

@@ -16,8 +16,10 @@ from ico3d.errors import SettingsError
 from ico3d.motion.roles import Cast, cast
 
 LIT = 0.65
-"""Quantile of a hand's brightness, in mean logits of r, g, b, that counts as skin in light: by area,
-as fingers have the most Gaussians by number."""
+"""Quantile of a hand's brightness, in mean logits of r, g, b, that counts as skin in light.
+
+It is one of areas, as fingers have the most Gaussians by number.
+"""
 AROUND = 0.005
 """Radius in metres in which brightness is shade; what is smaller than that is detail."""
 KEPT = 0.4
