@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ico3d.errors import CaptureError
+from ico3d.measure.faces import action_units
 from ico3d.measure.faces.action_units import (
     LOWER,
     UPPER,
@@ -98,3 +99,12 @@ def test_a_table_of_empty_lines_takes_no_memory(tmp_path):
     assert read_action_units(path).frames.tolist() == [1, 2]
     assert tracemalloc.get_traced_memory()[1] < 16 << 20
     tracemalloc.stop()
+
+
+def test_a_table_too_long_is_refused_and_not_cut(tmp_path, monkeypatch):
+    path = write_table(tmp_path / "a.csv", {"AU12": [1.0, 2.0, 3.0]})
+    monkeypatch.setattr(action_units, "MOST_ROWS", 4)
+    assert read_action_units(path).frames.tolist() == [1, 2, 3]
+    monkeypatch.setattr(action_units, "MOST_ROWS", 3)
+    with pytest.raises(CaptureError, match="more than 3 rows"):
+        read_action_units(path)

@@ -63,9 +63,11 @@ def read_action_units(path: Path) -> ActionUnits:
     try:
         text = read_small(path).decode("utf-8-sig")
         lines = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
-        rows = list(islice((row for row in lines if row), MOST_ROWS))
+        rows = list(islice((row for row in lines if row), MOST_ROWS + 1))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CaptureError(f"{path} cannot be read as a table of OpenFace: {error}.") from None
+    if len(rows) > MOST_ROWS:
+        raise CaptureError(f"{path} has more than {MOST_ROWS} rows: cut it into parts.")
     names = [name.strip() for name in rows[0]] if rows else []
     wanted = [f"{unit}_r" for unit in LOWER + UPPER]
     lacking = [name for name in wanted if name not in names]
