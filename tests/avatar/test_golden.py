@@ -1,8 +1,9 @@
 """Models that earlier programs trained, in `golden/`: today's program draws the same Gaussians.
 
 `head-1` is of 2026-11-21, before heads told landmarks, eyes and turns, `head-2` of 2026-11-23,
-before they turned, `head-3` of 2026-11-24; `scene-1` is of 2026-11-21, `body-1` of 2026-11-23. The
-sums in `expected.json` were computed by the programs that wrote the models.
+before they turned, `head-3` of 2026-11-24, before their skin moved, `head-4` of 2026-11-28;
+`scene-1` is of 2026-11-21, `body-1` of 2026-11-23. The sums in `expected.json` were computed by the
+programs that wrote the models.
 """
 
 import json

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ico3d.bundle.evaluate import attributes, coefficients, logits
+from ico3d.bundle.evaluate import attributes, centres, coefficients, logits
 from support.bundles.random_bundle import random_head
 
 
@@ -27,6 +27,18 @@ def test_it_is_the_documented_formula():
             blend = sum(c[k] * int(head.basis[k, n, j]) for k in range(3))
             expected = float(head.mean_logits[n, j]) + float(head.basis_scale[n]) * blend
             np.testing.assert_allclose(logits(head, e)[n, j], expected, rtol=1e-5, atol=1e-5)
+
+
+def test_centres_are_the_documented_formula():
+    head, e = random_head(5), np.linspace(-1, 1, 39)
+    rows = head.displacement_map.astype(np.float64)
+    steps = [sum(e[b] * rows[b, m] for b in range(39)) + rows[39, m] for m in range(2)]
+    moved = centres(head, e)
+    assert np.abs(moved - head.means).max() > 1e-3
+    for n in range(5):
+        for axis in range(3):
+            by = sum(steps[m] * int(head.displacement_basis[m, n, axis]) for m in range(2))
+            np.testing.assert_allclose(moved[n, axis], head.means[n, axis] + by, atol=1e-6)
 
 
 def test_tracks_are_evaluated_row_by_row():

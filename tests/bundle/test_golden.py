@@ -1,7 +1,7 @@
 """Bundles that the program of each version wrote, in `golden/`: today's shows the same Gaussians.
 
-What `expected.json` says of them, the program that wrote them computed: colours and opacities for
-one expression, sums of poses and of each tensor.
+What `expected.json` says of them, the program that wrote them computed: colours, opacities and
+centres for one expression, sums of poses and of each tensor.
 """
 
 import dataclasses
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.bundle.evaluate import attributes
+from ico3d.bundle.evaluate import attributes, centres
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import VERSION
 from ico3d.errors import BundleError
@@ -53,6 +53,8 @@ def test_an_old_bundle_shows_what_it_showed(name):
         colors, opacities = attributes(head, expression)
         np.testing.assert_allclose(colors, said["rgb"], atol=2e-4)
         np.testing.assert_allclose(opacities, said["opacity"], atol=2e-4)
+        where = said.get("centres", head.means)  # Gaussians stood still before version 6
+        np.testing.assert_allclose(centres(head, expression), where, atol=2e-4)
         np.testing.assert_allclose(poses.sum(0), said["poses"], atol=1e-3)
     for index, tensors in enumerate(said.get("windows", ())):
         assert sums(bundle.window(index)) == pytest.approx(tensors, abs=1e-3)

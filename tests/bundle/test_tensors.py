@@ -41,6 +41,7 @@ def test_other_programs_can_read_it():
         "scales": "float16",
         "mean_logits": "float16",
         "basis_scale": "float32",
+        "displacement_map": "float32",
         "w1": "float32",
         "b1": "float32",
         "w2": "float32",

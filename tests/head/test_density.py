@@ -5,7 +5,7 @@ import torch
 
 from ico3d.errors import ModelError
 from ico3d.head.density import HeadDensity, Sampled
-from ico3d.head.model import GAUSSIAN_AXES, HeadModel
+from ico3d.head.model import HeadModel
 from ico3d.head.settings import PRESETS
 from ico3d.splat.density import DensityStats
 from ico3d.training.optimiser import Optimiser
@@ -33,15 +33,16 @@ def _sampled(opacities: list[float], contributions: list[float]):
 
 def _planned() -> tuple[HeadModel, HeadModel, Optimiser]:
     """Three Gaussians: one stays, a small one is cloned, a faint one dies; before and after."""
-    models = [HeadModel(head_shape(2, features=4), 3) for _ in range(2)]
+    models = [HeadModel(head_shape(2, features=4, displacements=2), 3) for _ in range(2)]
     for model in models:
         model.log_scales.data.fill_(-9)
         numbers = torch.arange(3.0)
         model.means.data = numbers[:, None].repeat(1, 3)
         model.basis.data = numbers[None, :, None].repeat(3, 1, 4).clone()
+        model.displacement_basis.data = numbers[None, :, None].repeat(2, 1, 3).clone()
     before, after = models
     optimiser = Optimiser()
-    for name in GAUSSIAN_AXES:
+    for name in after.gaussian_axes:
         optimiser.moments[f"{name}.first"] = getattr(after, name).detach().clone() + 1
         optimiser.moments[f"{name}.second"] = getattr(after, name).detach().clone() + 2
     density = HeadDensity(SETTINGS.density, 0)
@@ -54,14 +55,14 @@ def test_clones_copy_basis_and_geometry():
     before, after, _ = _planned()
     assert len(after) == 3
     sources = [0, 1, 1]
-    for name, axis in GAUSSIAN_AXES.items():
+    for name, axis in after.gaussian_axes.items():
         expected = getattr(before, name).index_select(axis, torch.tensor(sources))
         torch.testing.assert_close(getattr(after, name), expected)
 
 
 def test_moments_follow_and_those_of_clones_begin_at_zero():
     before, _, optimiser = _planned()
-    for name, axis in GAUSSIAN_AXES.items():
+    for name, axis in before.gaussian_axes.items():
         moment = optimiser.moments[f"{name}.first"].movedim(axis, 0)
         old = getattr(before, name).detach().movedim(axis, 0) + 1
         torch.testing.assert_close(moment[:2], old[:2])

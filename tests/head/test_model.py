@@ -7,7 +7,7 @@ import sys
 import pytest
 import torch
 
-from ico3d.errors import ModelError
+from ico3d.errors import ModelError, SettingsError
 from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.network import SpeechAdaptor
@@ -85,6 +85,50 @@ def test_gradients_by_finite_differences(variant):
     expression = torch.tensor([0.2, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
     parameters = [dict(model.named_parameters())[name] for name in names]
     assert torch.autograd.gradcheck(appearance, (expression, *parameters))
+
+
+def _moving(dtype=torch.float64) -> HeadModel:
+    torch.manual_seed(0)
+    shape = head_shape(3, features=8, hidden=6, frequencies=2, turns=True, displacements=2)
+    model = HeadModel(shape, 5).to(dtype)
+    model.displacement_basis.data = torch.randn(2, 5, 3, dtype=dtype)
+    model.displacement_map.copy_(torch.randn(4, 2))
+    return model
+
+
+def test_centres_move_linearly_with_the_expression_and_not_with_the_heads_rotation():
+    model, e = _moving(), torch.tensor([0.2, -0.5, 0.7], dtype=torch.float64)
+    rows = model.displacement_map
+    c = [sum(float(e[b] * rows[b, m]) for b in range(3)) + float(rows[3, m]) for m in range(2)]
+    expected = model.means + c[0] * model.displacement_basis[0] + c[1] * model.displacement_basis[1]
+    torch.testing.assert_close(model(e).means, expected)
+    turned = torch.cat([e, torch.ones(3, dtype=torch.float64)])
+    assert torch.equal(model(turned).means, model(e).means)
+
+
+def test_displacements_have_the_gradients_of_finite_differences():
+    model = _moving()
+
+    def places(expression, means, basis):
+        named = {"means": means, "displacement_basis": basis}
+        return torch.func.functional_call(model, named, expression).means
+
+    e = torch.tensor([0.2, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(places, (e, model.means, model.displacement_basis))
+
+
+@pytest.mark.parametrize("count", [-1, 17, 2.0])
+def test_a_head_has_no_more_displacements_than_a_bundle_can_hold(count):
+    with pytest.raises(SettingsError, match="A head's displacements is 0 to 16, not"):
+        head_shape(3, displacements=count)
+
+
+def test_a_file_brings_the_displacements_back(tmp_path):
+    model = _moving(torch.float32)
+    model.save(tmp_path / "model.safetensors")
+    loaded = HeadModel.load(tmp_path / "model.safetensors")
+    e = torch.tensor([0.2, -0.5, 0.7])
+    assert loaded.shape.displacements == 2 and torch.equal(loaded(e).means, model(e).means)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

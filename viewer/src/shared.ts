@@ -4,7 +4,7 @@
 export const BUNDLE_FORMAT = "ico3d-bundle";
 
 /** The newest version of a manifest. */
-export const BUNDLE_VERSION = 5;
+export const BUNDLE_VERSION = 6;
 
 /** The oldest version that is read. */
 export const OLDEST_BUNDLE = 1;
@@ -16,7 +16,7 @@ export const MAX_GAUSSIANS = 1000000;
 export const SPZ = {"ratio": 8, "free": 262144, "degree": 3} as const;
 
 /** What else a bundle may have: a head's counts, a body's frames, bytes of a file. */
-export const MOST = {"rank": 64, "hidden": 1024, "expression_size": 512, "num_poses": 100000, "window_frames": 1000, "posed_frames": 30000, "file_bytes": 268435456} as const;
+export const MOST = {"rank": 64, "displacements": 16, "hidden": 1024, "expression_size": 512, "num_poses": 100000, "window_frames": 1000, "posed_frames": 30000, "file_bytes": 268435456} as const;
 
 /** Residual shapes of a body on a skeleton. */
 export const MAX_SHAPES = 8;

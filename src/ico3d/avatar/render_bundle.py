@@ -10,7 +10,7 @@ import torch
 
 from ico3d.avatar.avatar import Placement
 from ico3d.avatar.baked_body import BakedBody, body_of, gaussians_at
-from ico3d.bundle.evaluate import attributes
+from ico3d.bundle.evaluate import attributes, centres
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
@@ -26,7 +26,7 @@ def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
     """The N Gaussians of a baked head for an expression (B,), in canonical head space."""
     rgb, opacity = attributes(head, expression)
     return Gaussians(
-        means=torch.tensor(head.means),
+        means=torch.from_numpy(centres(head, expression)),
         quats=torch.tensor(head.quats.astype(np.float32)),
         scales=torch.tensor(head.scales.astype(np.float32)).exp(),
         opacities=torch.from_numpy(opacity),

@@ -28,6 +28,13 @@ def logits(head: BakedHead, expression: np.ndarray) -> np.ndarray:
     return head.mean_logits.astype(np.float32) + head.basis_scale[:, None] * blend
 
 
+def centres(head: BakedHead, expression: np.ndarray) -> np.ndarray:
+    """Centres (N, 3) float32 for an expression (B,): means + Σ_m d_m(e) · displacement_basis[m]."""
+    rows = head.displacement_map
+    steps = np.asarray(expression, np.float32) @ rows[:-1] + rows[-1]  # (M,)
+    return head.means + np.tensordot(steps, head.displacement_basis.astype(np.float32), 1)
+
+
 def attributes(head: BakedHead, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Colours and opacities of the Gaussians for an expression (B,).
 

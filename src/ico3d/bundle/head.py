@@ -26,8 +26,10 @@ _AXES: Axes = {
     "mean_logits": 0,
     "basis": 1,
     "basis_scale": 0,
+    "displacement_basis": 1,
 }
 _MAX_LOG_SCALE = 10.0
+_MAX_STEP = 1.0
 _MAX_LENGTH = 1e4
 """Metres; anything farther is no person, and overflows when it is squared in a shader."""
 
@@ -36,7 +38,8 @@ _MAX_LENGTH = 1e4
 class BakedHead:
     """N Gaussians in canonical head space; colour and opacity are low-rank in the expression.
 
-    Baked heads have their Gaussians sorted by importance.
+    Where there are M > 0 displacements, Gaussians also move, linearly in the expression. Baked
+    heads have their Gaussians sorted by importance.
 
     Attributes:
         means: (N, 3) float32 metres.
@@ -45,6 +48,9 @@ class BakedHead:
         mean_logits: (N, 4) float16 mean logits Ȳ of r, g, b and opacity.
         basis: (K, N, 4) int8 basis vectors of the logits.
         basis_scale: (N,) float32 logits per unit of `basis`.
+        displacement_basis: (M, N, 3) int8 displacements of the centres.
+        displacement_map: (B + 1, M) float32, from an expression and a 1 to metres per unit of
+            `displacement_basis`.
         w1: (B, H) float32, first layer of the coefficient network.
         b1: (H,) float32, first layer's bias.
         w2: (H, K) float32, second layer.
@@ -57,6 +63,8 @@ class BakedHead:
     mean_logits: np.ndarray
     basis: np.ndarray
     basis_scale: np.ndarray
+    displacement_basis: np.ndarray
+    displacement_map: np.ndarray
     w1: np.ndarray
     b1: np.ndarray
     w2: np.ndarray
@@ -71,6 +79,11 @@ class BakedHead:
     def rank(self) -> int:
         """K, the number of basis vectors."""
         return self.basis.shape[0]
+
+    @property
+    def num_displacements(self) -> int:
+        """M, the number of displacements of each Gaussian."""
+        return self.displacement_basis.shape[0]
 
     @property
     def hidden(self) -> int:
@@ -104,7 +117,8 @@ class BakedHead:
             BundleError: If shapes or dtypes do not fit one another, or a value is out of range.
         """
         _check_values(self)
-        return split_tensors(self._tensors, self._spec, _AXES, first, (HEAD, HEAD_REST))
+        spec = self._spec
+        return split_tensors(self._tensors, spec, _axes_of(spec), first, (HEAD, HEAD_REST))
 
     @property
     def _tensors(self) -> dict[str, np.ndarray]:
@@ -112,7 +126,13 @@ class BakedHead:
 
     @property
     def _spec(self) -> Spec:
-        return _head_spec(self.num_gaussians, self.rank, self.hidden, self.expression_size)
+        return _head_spec(
+            self.num_gaussians,
+            self.rank,
+            self.hidden,
+            self.expression_size,
+            self.num_displacements,
+        )
 
     @staticmethod
     def from_bytes(data: bytes, info: HeadInfo, rest: bytes = b"") -> "BakedHead":
@@ -126,11 +146,15 @@ class BakedHead:
         Raises:
             BundleError: If a file is malformed or does not fit the manifest.
         """
-        spec = _head_spec(info.num_gaussians, info.rank, info.hidden, info.expression_size)
+        size, moved = info.expression_size, info.num_displacements
+        spec = _head_spec(info.num_gaussians, info.rank, info.hidden, size, moved)
         if info.num_rest:
-            tensors = join_tensors((data, rest), spec, _AXES, info.num_rest, (HEAD, HEAD_REST))
+            names = (HEAD, HEAD_REST)
+            tensors = join_tensors((data, rest), spec, _axes_of(spec), info.num_rest, names)
         else:
             tensors = decode_tensors(data, spec, HEAD)
+        if not moved:
+            tensors |= no_displacements(info.num_gaussians, size)
         head = BakedHead(**tensors)
         _check_values(head)
         return head
@@ -175,6 +199,14 @@ class BakedShoulders:
         return BakedShoulders(**tensors)
 
 
+def no_displacements(num_gaussians: int, expression_size: int) -> dict[str, np.ndarray]:
+    """The displacements of a head whose N Gaussians stand still, for B values of an expression."""
+    return {
+        "displacement_basis": np.zeros((0, num_gaussians, 3), np.int8),
+        "displacement_map": np.zeros((expression_size + 1, 0), np.float32),
+    }
+
+
 def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
     """The content of `head_poses.safetensors` from (F, 4, 4) rigid transforms.
 
@@ -198,8 +230,9 @@ def poses_from_bytes(data: bytes, num_poses: int) -> np.ndarray:
     return poses
 
 
-def _head_spec(n: int, k: int, h: int, b: int) -> Spec:
-    return {
+def _head_spec(n: int, k: int, h: int, b: int, m: int) -> Spec:
+    moving = {"displacement_basis": ("I8", (m, n, 3)), "displacement_map": ("F32", (b + 1, m))}
+    return (moving if m else {}) | {
         "means": ("F32", (n, 3)),
         "quats": ("F16", (n, 4)),
         "scales": ("F16", (n, 3)),
@@ -211,6 +244,11 @@ def _head_spec(n: int, k: int, h: int, b: int) -> Spec:
         "w2": ("F32", (h, k)),
         "b2": ("F32", (k,)),
     }
+
+
+def _axes_of(spec: Spec) -> Axes:
+    """The axes of the tensors that a head has."""
+    return {name: axis for name, axis in _AXES.items() if name in spec}
 
 
 def _poses_spec(f: int) -> Spec:
@@ -226,6 +264,8 @@ def _check_values(head: BakedHead) -> None:
         raise BundleError(f"{HEAD}: 'means' reaches farther than {_MAX_LENGTH:g} m.")
     if head.scales.max() > _MAX_LOG_SCALE:
         raise BundleError(f"{HEAD}: 'scales' exceeds exp({_MAX_LOG_SCALE:g}) m.")
+    if (np.abs(head.displacement_map) > _MAX_STEP).any():
+        raise BundleError(f"{HEAD}: 'displacement_map' has steps of more than {_MAX_STEP:g} m.")
     norms = np.linalg.norm(head.quats.astype(np.float32), axis=1)
     if np.abs(norms - 1).max() > 1e-2:
         raise BundleError(f"{HEAD}: 'quats' are not normalised.")

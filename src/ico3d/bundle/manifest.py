@@ -15,18 +15,21 @@ from ico3d.bundle.people.provenance import (
 )
 from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
 from ico3d.bundle.skinned.info import SkinnedInfo, check_skinned
+from ico3d.common.expression import MOST_DISPLACEMENTS
 from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 5
+VERSION = 6
 SINCE = {"body": 2, "skinned": 3}
 """Version in which a field appeared; in older manifests that field is read as null."""
 SINCE_CASTERS = 4
 """Version in which a body on a skeleton got `num_casters`; older ones cast no shadow."""
 SINCE_REST = 5
 """Version in which heads and bodies on a skeleton got `num_rest`; older ones are in one file."""
+SINCE_DISPLACEMENTS = 6
+"""Version in which heads got `num_displacements`; Gaussians of older ones stand still."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
@@ -57,6 +60,7 @@ class HeadInfo:
         idle_expression: (B,) expression of the neutral face in silence with open eyes.
         num_rest: Number of the Gaussians in `head_rest.safetensors`, the least important ones; 0
             where all are in one file.
+        num_displacements: M, number of ways in which Gaussians move with the expression.
     """
 
     num_gaussians: int
@@ -70,6 +74,7 @@ class HeadInfo:
     num_poses: int
     idle_expression: tuple[float, ...]
     num_rest: int = 0
+    num_displacements: int = 0
 
 
 @dataclass(frozen=True)
@@ -227,6 +232,8 @@ class Manifest:
                 for part in ("head", "skinned")
                 if isinstance(value.get(part), dict)
             }
+        if value["version"] < SINCE_DISPLACEMENTS and isinstance(value.get("head"), dict):
+            value |= {"head": {"num_displacements": 0, **value["head"]}}
         missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
         if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
@@ -289,6 +296,8 @@ def _check_head(head: HeadInfo) -> None:
     }
     for name, top in ranges.items():
         _require(1 <= getattr(head, name) <= top, f"head.{name}", f"lie between 1 and {top}")
+    few = 0 <= head.num_displacements <= MOST_DISPLACEMENTS
+    _require(few, "head.num_displacements", f"lie between 0 and {MOST_DISPLACEMENTS}")
     inside = 0 <= head.num_rest < head.num_gaussians
     _require(inside, "head.num_rest", "be less than head.num_gaussians")
     _require(head.inputs in ("speech", "blendshapes"), "head.inputs", "be speech or blendshapes")

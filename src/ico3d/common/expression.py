@@ -21,6 +21,9 @@ EYE_NAMES = (
 TURN_SIZE = 3
 """Number of values that tell how a head is turned, after the expression vector."""
 
+MOST_DISPLACEMENTS = 16
+"""Largest number of ways in which a head's Gaussians move with its expression."""
+
 LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
 """Indices of the eyelids in `EYE_NAMES`."""
 

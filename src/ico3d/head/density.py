@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ico3d.errors import ModelError
-from ico3d.head.model import GAUSSIAN_AXES, HeadModel
+from ico3d.head.model import HeadModel
 from ico3d.head.settings import Density
 from ico3d.splat.density import (
     DensitySettings,
@@ -129,8 +129,8 @@ def _carry_out(
     plan: Plan, model: HeadModel, optimiser: Optimiser, generator: torch.Generator
 ) -> None:
     """Applies a plan to parameters and moments."""
-    values = {name: getattr(model, name).detach() for name in GAUSSIAN_AXES}
-    population = Population(values, optimiser.moments, GAUSSIAN_AXES)
+    values = {name: getattr(model, name).detach() for name in model.gaussian_axes}
+    population = Population(values, optimiser.moments, model.gaussian_axes)
     population.carry_out(plan, generator)
     model.resize(len(plan))
     for name, value in population.parameters.items():

@@ -14,6 +14,7 @@ from ico3d.capture.surface.head import head_silhouettes
 from ico3d.common.camera import Camera
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
+from ico3d.head.blending.displacement import Displacement
 from ico3d.head.model import HeadModel, HeadShape, Variant
 from ico3d.head.portrait.shoulders import neck_of
 from ico3d.head.settings import HeadSettings
@@ -42,6 +43,7 @@ def initial_head(
     variant: Variant,
     expression_size: int,
     rng: np.random.Generator,
+    displacement: Displacement | None = None,
 ) -> HeadModel:
     """A head with round Gaussians on the capture's surface points, as wide as the points' spacing.
 
@@ -54,6 +56,7 @@ def initial_head(
         variant: The model's variant.
         expression_size: B, the number of values of an expression.
         rng: Source of all random choices.
+        displacement: How the face's landmarks move; None for Gaussians that stand still.
 
     Raises:
         CaptureError: If the capture has no surface points, or one is not finite.
@@ -77,10 +80,13 @@ def initial_head(
         sh_degree=settings.sh_degree,
         turns=settings.turns and variant in ("full", "no-mlp") and capture.shows == "head",
         neck=neck_of(capture),
+        displacements=0 if displacement is None else len(displacement.modes),
     )
     model = HeadModel(shape, len(points))
     model.means.data = torch.from_numpy(points).float()
     model.log_scales.data = torch.from_numpy(np.log(widths)).float()[:, None].repeat(1, 3)
+    if displacement is not None:
+        model.displacement_basis.data = torch.from_numpy(displacement.spread(points)).float()
     return model
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from ico3d.common.expression import TURN_SIZE
+from ico3d.common.expression import MOST_DISPLACEMENTS, TURN_SIZE
 from ico3d.errors import ModelError, SettingsError
 from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
@@ -30,9 +30,6 @@ Variant = Literal["full", "no-mlp", "no-blending", "static"]
 INITIAL_OPACITY = 0.1
 MOST = 8192
 """Largest size of an expression, of the MLP and of what it reads."""
-
-GAUSSIAN_AXES = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
-"""What is learnt per Gaussian, with the axis along which the Gaussians lie."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +53,8 @@ class HeadShape:
             follows lamps that stand still (`TurnRange`).
         relit: Whether each Gaussian has a change of light (`HeadModel.relit`).
         neck: Where a portrait's neck bends; None where all Gaussians follow the head.
+        displacements: M, number of ways in which Gaussians move with the expression; 0 for
+            Gaussians that stand still, as in the paper.
     """
 
     expression_size: int
@@ -70,6 +69,7 @@ class HeadShape:
     turns: bool = False
     relit: bool = False
     neck: Neck | None = None
+    displacements: int = 0
 
     def __post_init__(self):
         """Checks the sizes, of which a file of a few bytes can name any.
@@ -77,11 +77,12 @@ class HeadShape:
         Raises:
             SettingsError: If one is below its least or above `MOST`.
         """
-        least = {"expression_size": 0, "features": 1, "hidden": 1, "frequencies": 0}
-        for name, fewest in least.items():
+        sizes = {"expression_size": 0, "features": 1, "hidden": 1}
+        for name, fewest in (sizes | {"frequencies": 0, "displacements": 0}).items():
             value = getattr(self, name)
-            if type(value) is not int or not fewest <= value <= MOST:
-                raise SettingsError(f"A head's {name} is {fewest} to {MOST:,}, not {value!r:.40}.")
+            most = MOST_DISPLACEMENTS if name == "displacements" else MOST
+            if type(value) is not int or not fewest <= value <= most:
+                raise SettingsError(f"A head's {name} is {fewest} to {most:,}, not {value!r:.40}.")
 
     @property
     def outputs(self) -> int:
@@ -119,11 +120,11 @@ class HeadShape:
 class HeadModel(nn.Module):
     """N Gaussians in canonical head space, driven by an expression.
 
-    Geometry is static. Colour and opacity are φ(f, γ(μ)): the MLP φ reads the blended features
-    f = Fᵀe + f_0 and the encoded position γ(μ) of each Gaussian. The values (N, V) that φ returns
-    are logits of red, green, blue and opacity. If V > 4, coefficients of spherical harmonics above
-    degree 0 follow, three colours each, which change the colours by the direction of view in
-    canonical head space.
+    Geometry is static, or moves a little with the expression (`displaced`). Colour and opacity are
+    φ(f, γ(μ)): the MLP φ reads the blended features f = Fᵀe + f_0 and the encoded position γ(μ) of
+    each Gaussian. The values (N, V) that φ returns are logits of red, green, blue and opacity. If
+    V > 4, coefficients of spherical harmonics above degree 0 follow, three colours each, which
+    change the colours by the direction of view in canonical head space.
 
     Attributes:
         shape: Sizes and variant.
@@ -134,6 +135,9 @@ class HeadModel(nn.Module):
             counts, and of the bias f_0.
         light: (N, 3) what is added to the logits of red, green and blue in every expression; only
             where the shape is `relit`.
+        displacement_basis: (M, N, 3) metres by which Gaussians move where a coefficient is 1; only
+            where the shape has `displacements`.
+        displacement_map: (B + 1, M) from an expression and a 1 to coefficients; not trained.
     """
 
     def __init__(self, shape: HeadShape, num_gaussians: int):
@@ -149,6 +153,10 @@ class HeadModel(nn.Module):
         self.basis = nn.Parameter(torch.zeros(shape.rows, count, shape.width))
         if shape.relit:
             self.light = nn.Parameter(torch.zeros(count, 3))
+        if shape.displacements:
+            moved, rows = shape.displacements, shape.expression_size + 1
+            self.displacement_basis = nn.Parameter(torch.zeros(moved, count, 3))
+            self.register_buffer("displacement_map", torch.zeros(rows, moved))
         bias = math.log(INITIAL_OPACITY / (1 - INITIAL_OPACITY))
         if shape.has_mlp:
             self.trunk = nn.Linear(shape.mlp_inputs, shape.hidden)
@@ -171,29 +179,45 @@ class HeadModel(nn.Module):
         """The device of the parameters."""
         return self.means.device
 
+    @property
+    def gaussian_axes(self) -> dict[str, int]:
+        """What this model has per Gaussian, with the axis along which the Gaussians lie."""
+        axes = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
+        if self.shape.displacements:
+            axes["displacement_basis"] = 1
+        return axes | ({"light": 0} if self.shape.relit else {})
+
     def resize(self, num_gaussians: int) -> None:
         """Changes the number of Gaussians; the caller sets all values afterwards."""
-        for name, axis in GAUSSIAN_AXES.items():
+        for name, axis in self.gaussian_axes.items():
             old = getattr(self, name)
             size = list(old.shape)
             size[axis] = num_gaussians
             setattr(self, name, nn.Parameter(old.new_empty(size), old.requires_grad))
 
-    def forward(self, expression: Tensor, features: Tensor | None = None) -> Gaussians:
+    def forward(
+        self,
+        expression: Tensor,
+        features: Tensor | None = None,
+        moves: Tensor | None = None,
+    ) -> Gaussians:
         """The Gaussians for an expression.
 
         Args:
             expression: (B,), on any device; sounds and captures give expressions on the CPU. The
                 values (3,) of the head's rotation may follow; without them it is the mean one.
             features: (N, w) features that the basis was already blended to; None to blend them.
+            moves: (M,) coefficients of the displacements; None for what the expression tells.
 
         Returns:
             Gaussians in canonical head space.
         """
-        return self.gaussians(self.logits(expression, features))
+        if moves is None:
+            moves = self.moves(expression)
+        return self.gaussians(self.logits(expression, features), moves)
 
     def logits(self, expression: Tensor, features: Tensor | None = None) -> Tensor:
-        """(N, V) values of the Gaussians; arguments as for `forward`."""
+        """(N, V) values of the Gaussians; expression and features as for `forward`."""
         if features is None:
             features = self.blended(expression)
         values = self.decode(features, expression)
@@ -256,14 +280,31 @@ class HeadModel(nn.Module):
         center = self.means.new_tensor(self.shape.box_center)
         return (self.means - center) / self.shape.box_size
 
-    def gaussians(self, logits: Tensor) -> Gaussians:
-        """Renderable Gaussians with the given values (N, V)."""
+    def moves(self, expression: Tensor) -> Tensor:
+        """(M,) coefficients of the displacements that an expression (B,) tells.
+
+        Values after the B, of the head's rotation, have no effect.
+        """
+        if not self.shape.displacements:
+            return expression.new_zeros(0)
+        mapping: Tensor = self.displacement_map  # type: ignore[assignment]
+        return expression[: self.shape.expression_size].to(mapping) @ mapping[:-1] + mapping[-1]
+
+    def displaced(self, moves: Tensor) -> Tensor:
+        """Centres (N, 3) in metres for coefficients (M,) of the displacements."""
+        if not self.shape.displacements:
+            return self.means
+        shift = torch.einsum("m,mnc->nc", moves.to(self.means), self.displacement_basis)  # (N, 3)
+        return self.means + shift
+
+    def gaussians(self, logits: Tensor, moves: Tensor) -> Gaussians:
+        """Renderable Gaussians with values (N, V), displaced by coefficients (M,)."""
         values, rest = torch.sigmoid(logits[:, :4]), logits[:, 4:]
         colors, sh = values[:, :3], None
         if rest.shape[1]:
             sh = harmonics.of_colors(colors, rest.unflatten(1, (-1, 3)))  # (N, K, 3)
         return Gaussians(
-            means=self.means,
+            means=self.displaced(moves),
             quats=self.quats,
             scales=self.log_scales.exp(),
             opacities=values[:, 3],

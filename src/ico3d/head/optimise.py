@@ -31,7 +31,8 @@ from ico3d.training.epochs import Epochs
 from ico3d.training.optimiser import Optimiser, check_moments
 
 CPU = torch.device("cpu")
-GEOMETRY = ("means", "quats", "log_scales")
+GEOMETRY = {"means": 0, "quats": 0, "log_scales": 0, "displacement_basis": 1}
+"""Parameters that say where and how large Gaussians are, with the axis of the Gaussians."""
 
 LEAST_TOLD = 0.5
 """If any picture has a mask or a plate, at least this share of the pictures must have one."""
@@ -57,6 +58,7 @@ class HeadTrainer:
         views: The views to learn from, frame by frame.
         poses: Hash of the capture's head poses, which identifies the canonical head space.
         turn: How far the head turns in the training frames; None if the model ignores that.
+        seen_moves: (M,) coefficients of the displacements by frame, where landmarks were seen.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class HeadTrainer:
         adaptor: SpeechAdaptor | None,
         settings: HeadSettings,
         seed: int,
+        moves: Mapping[int, Tensor] | None = None,
     ):
         """Finds the recorded views of the training frames.
 
@@ -75,7 +78,7 @@ class HeadTrainer:
             SettingsError: If the model is to be compiled and there is no compiler.
         """
         self.model, self.track, self.adaptor = model, track, adaptor
-        self._capture = capture
+        self._capture, self.seen_moves = capture, moves or {}
         self._settings, self._seed = settings, seed
         self.pictures = PictureCache(capture, settings.cache_gib, settings.cache_dir)
         self.views = self.pictures.views(capture.split.train, LEAST_TOLD)
@@ -125,7 +128,7 @@ class HeadTrainer:
         background, target = self._staged(view, picture, index)
         expression = self.expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
-        gaussians = self.model.gaussians(self._decode(features, expression))
+        gaussians = self.model.gaussians(self._decode(features, expression), self.moves(view))
         gaussians = self.posed(gaussians.up_to_degree(index // self._settings.sh_every), view)
         absgrad = self._settings.density.absgrad
         rendering = render(gaussians, [view.camera], background, absgrad=absgrad)
@@ -147,6 +150,12 @@ class HeadTrainer:
         if self.turn is not None:
             expression = torch.cat([expression, self._turns[view.frame]])  # (B + 3,)
         return expression.to(self.model.device)
+
+    def moves(self, view: View) -> Tensor:
+        """Coefficients (M,) of the displacements in a view's frame: seen, or else told."""
+        if (seen := self.seen_moves.get(view.frame)) is not None:
+            return seen
+        return self.model.moves(self.expression(view).detach())
 
     def posed(self, gaussians: Gaussians, view: View) -> Gaussians:
         """The head's Gaussians with the shoulders where they are in a view's frame."""
@@ -276,8 +285,11 @@ class HeadTrainer:
         weights = model.row_weights(expression)
         features = blend_of(model.basis, weights, chosen).requires_grad_()  # (n, w)
         fixed = {name: value.detach() for name, value in model.named_parameters()}
-        fixed |= {name: fixed[name][chosen] for name in GEOMETRY}  # (n, ...)
-        gaussians: Gaussians = functional_call(model, fixed, (expression, features))
+        for name, axis in GEOMETRY.items() & model.gaussian_axes.items():
+            fixed[name] = fixed[name].index_select(axis, chosen)  # (n, ...)
+        gaussians: Gaussians = functional_call(
+            model, fixed, (expression, features, self.moves(part))
+        )
         rendering = render(gaussians, [part.camera], background)
         self._loss(rendering, target, picture, index).backward()
         assert features.grad is not None
@@ -290,7 +302,7 @@ class HeadTrainer:
         rates["means"] *= self.model.shape.box_size
         if self._settings.optimiser == "sgd":
             rates = {name: rate * SGD_GAINS[name] for name, rate in rates.items()}
-        return rates
+        return rates | {"displacement_basis": self._settings.rates.displacement * rates["means"]}
 
     def _turn_values(self, frames: Sequence[int]) -> dict[int, Tensor]:
         """The values (3,) of the head's rotation by frame; one by one they cost a step 0.5 ms."""
@@ -352,7 +364,7 @@ class HeadTrainer:
         chosen = rng.choice(len(self.views), size=min(SAMPLES, len(self.views)), replace=False)
         opacities, given = [], []
         for view in (self.views[i] for i in chosen):
-            gaussians = self.posed(self.model(self.expression(view)), view)
+            gaussians = self.posed(self.model(self.expression(view), moves=self.moves(view)), view)
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])
         return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))

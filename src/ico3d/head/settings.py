@@ -58,6 +58,7 @@ class Rates:
         position: Learning rate of the Gaussians' centres, relative to half the edge of the box
             around the points that training begins with.
         position_decay: Factor to which the rate of the centres has decayed at the last step.
+        displacement: Learning rate of the Gaussians' displacements, relative to that of centres.
         rotation: Learning rate of the Gaussians' rotations (quaternions).
         scale: Learning rate of the logarithms of the Gaussians' sizes.
         shape_decay: Factor to which the rates of rotations and sizes have decayed at the last step.
@@ -77,6 +78,7 @@ class Rates:
 
     position: float = 1.6e-4
     position_decay: float = 0.01
+    displacement: float = 0.01
     rotation: float = 1e-3
     scale: float = 5e-3
     shape_decay: float = 1.0
@@ -176,6 +178,8 @@ class HeadSettings:
         close_ups: Further pictures per step, cropped about the mouth, from which the basis of the
             Gaussians there learns, and nothing else; none where the recording has no landmarks.
             Not in the paper.
+        displacements: Most ways in which Gaussians move with the expression, as the face's
+            landmarks do; 0 for Gaussians that stand still, as in the paper.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
             direction of view; bundles keep degree 0.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
@@ -199,6 +203,7 @@ class HeadSettings:
     basis_optimiser: Literal["adam", "rmsprop"] = "adam"
     even_rows: bool = False
     close_ups: int = 0
+    displacements: int = 0
     sh_degree: int = 0
     sh_every: int = 1_000
     checkpoint_every: int = 1_000

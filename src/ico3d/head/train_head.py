@@ -1,6 +1,6 @@
 """Trains a head on a capture and writes the model folder."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -10,6 +10,7 @@ import torch
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.landmark_motion import landmark_motion
 from ico3d.capture.face.lip_shapes import lip_shapes
 from ico3d.capture.parts.head_of_body import head_in
 from ico3d.capture.parts.held_out import training_part
@@ -18,6 +19,7 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError
+from ico3d.head.blending.displacement import Displacement, principal, told
 from ico3d.head.expressions import (
     FEATURE_RATE,
     BlendshapeTrack,
@@ -26,7 +28,7 @@ from ico3d.head.expressions import (
     speech_features,
 )
 from ico3d.head.initial_gaussians import initial_head
-from ico3d.head.model import Variant
+from ico3d.head.model import HeadModel, Variant
 from ico3d.head.model_folder import Inputs, TrainedHead
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import HeadSettings
@@ -113,6 +115,7 @@ def train_head(
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
     with nullcontext() if watched is None else watched(trainer) as watch:
         seconds = run_loop(trainer, run, loop, watch)
+    tell_moves(trainer.model, track, trainer.seen_moves)
     names = track.names if isinstance(track, BlendshapeTrack) else ()
     summary = {
         "train_seconds": seconds,
@@ -158,9 +161,41 @@ def trainer_of(
     torch.manual_seed(job.seed)  # layers draw their weights
     track, adaptor, encoder = _inputs(capture, job, place)
     rng = np.random.default_rng(job.seed)
-    model = initial_head(capture, settings, job.variant, track.size, rng)
+    count = 0 if job.variant == "static" else settings.displacements
+    found = displacement_of(capture, count)
+    model = initial_head(capture, settings, job.variant, track.size, rng, found)
     model.to(place)
-    return HeadTrainer(capture, model, track, adaptor, settings, job.seed), encoder
+    moves = {} if found is None else seen_moves(found, capture, sorted(capture.split.train))
+    tell_moves(model, track, moves)
+    return HeadTrainer(capture, model, track, adaptor, settings, job.seed, moves), encoder
+
+
+def displacement_of(capture: Capture, count: int) -> Displacement | None:
+    """The up to `count` ways in which the face moves in the training frames, by its landmarks."""
+    landmarks = canonical_landmarks(capture) if count else None
+    if landmarks is None:
+        return None
+    frames = sorted(capture.split.train)
+    return principal(landmarks, landmark_motion(capture, frames, landmarks), count)
+
+
+def seen_moves(
+    found: Displacement, capture: Capture, frames: Sequence[int]
+) -> dict[int, torch.Tensor]:
+    """The coefficients (M,) of the displacements in those of the frames that show landmarks."""
+    motion = landmark_motion(capture, frames, found.landmarks)  # (F, P, 3)
+    rows = torch.from_numpy(found.coefficients(motion))  # (F, M)
+    known = rows.isfinite().all(1).tolist()
+    return {frame: row for frame, row, here in zip(frames, rows, known, strict=True) if here}
+
+
+@torch.no_grad()
+def tell_moves(model: HeadModel, track: ExpressionTrack, moves: Mapping[int, torch.Tensor]) -> None:
+    """Fits what expressions tell of a head's displacements to coefficients (M,) by frame."""
+    if moves:
+        expressions = torch.stack([track.at(frame) for frame in moves]).numpy()  # (F, B)
+        rows = told(expressions, torch.stack(list(moves.values())).numpy())  # (B + 1, M)
+        model.displacement_map.copy_(torch.from_numpy(rows))  # type: ignore[operator]
 
 
 def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:

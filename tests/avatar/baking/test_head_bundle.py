@@ -10,7 +10,7 @@ from ico3d.avatar.baking import head_bundle, head_cost
 from ico3d.avatar.baking.persona import load_persona
 from ico3d.avatar.baking.shader_head import CLIP, BakeSettings, HeadBaker
 from ico3d.avatar.render_bundle import render_bundle
-from ico3d.bundle.evaluate import logits
+from ico3d.bundle.evaluate import centres, logits
 from ico3d.bundle.manifest import Loss
 from ico3d.errors import BundleError
 from support.avatars.planted import driving, planted_blendshape_head
@@ -45,6 +45,17 @@ def test_baked_logits_are_the_exact_ones(fitted):
         exact = head.model.logits(torch.from_numpy(e)).detach().clamp(-CLIP, CLIP).numpy()
         error = logits(baked, e) - exact
         assert np.sqrt(np.square(error).mean()) < 0.1 * exact.std()
+
+
+def test_baked_centres_are_the_exact_ones(fitted):
+    head, capture, maker = fitted
+    baked = maker.baked(16)
+    rest = head.model.means.detach().numpy()
+    for e in expressions(head, capture, capture.split.test):
+        exact = head.model(torch.from_numpy(e)).means.detach().numpy()
+        found = centres(baked, e)  # by importance
+        nearest = np.linalg.norm(found[:, None] - exact, axis=-1).min(1)
+        assert nearest.max() < 1e-4 and np.abs(exact - rest).max() > 1e-3
 
 
 def test_a_higher_rank_is_better_and_larger(fitted):

@@ -14,7 +14,8 @@ def test_it_estimates_the_diagonal_of_the_squared_jacobian(blendshape_head):
     estimate = logit_importance(head.model, expression.expand(300, -1), [camera] * 300, behind, 0)
 
     logits = head.model.logits(expression).detach().requires_grad_()
-    image = render(head.model.gaussians(logits), [camera], behind).rgb.flatten()
+    shown = head.model.gaussians(logits, head.model.moves(expression))
+    image = render(shown, [camera], behind).rgb.flatten()
     rows = [torch.autograd.grad(pixel, logits, retain_graph=True)[0] for pixel in image]
     exact = torch.stack(rows).square().sum(0).sqrt().numpy()  # (N, 4)
     exact /= exact.mean()

@@ -140,7 +140,7 @@ def test_a_head_moves_as_gaussians_do(avatar):
     face = np.linspace(-1, 1, 39)
     moved = baked_gaussians(person_bundle.moved_head(head, similarity), face)
     expected = baked_gaussians(head, face).transform(similarity)
-    torch.testing.assert_close(moved.means, expected.means)
+    torch.testing.assert_close(moved.means, expected.means, rtol=0, atol=1e-4)  # of 8 mm
     torch.testing.assert_close(moved.scales, expected.scales, rtol=4e-3, atol=0)
     units = [torch.nn.functional.normalize(g.quats) for g in (expected, moved)]
     assert (units[0] * units[1]).sum(1).abs().min() > 1 - 1e-5

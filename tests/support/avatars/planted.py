@@ -88,9 +88,10 @@ class PlantedCapture(Capture):
 
 
 def planted_model(size: int) -> HeadModel:
-    """Random features on an ellipsoid; the last ten Gaussians are never seen."""
+    """Random features on an ellipsoid whose lower half moves; the last ten Gaussians are never
+    seen."""
     generator = torch.Generator().manual_seed(0)
-    model = HeadModel(head_shape(size), COUNT)
+    model = HeadModel(head_shape(size, displacements=2), COUNT)
     directions = torch.randn(COUNT, 3, generator=generator)
     directions /= directions.norm(dim=1, keepdim=True)
     model.means.data = directions * torch.tensor([0.08, 0.11, 0.09])
@@ -102,6 +103,10 @@ def planted_model(size: int) -> HeadModel:
         layer.bias.data.zero_()
     model.opacity_branch.bias.data.fill_(2.0)
     model.log_scales.data[-10:].fill_(np.log(1e-5))
+    low = (-directions[:, 1]).clamp_min(0)  # (N,)
+    model.displacement_basis.data[0, :, 1] = -0.004 * low
+    model.displacement_basis.data[1, :, 2] = 0.002 * low
+    model.displacement_map.copy_(torch.randn(size + 1, 2, generator=generator) * 0.4)
     return model
 
 

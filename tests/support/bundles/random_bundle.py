@@ -27,7 +27,8 @@ EXPRESSION_SIZE, EYE_OFFSET, FPS, NUM_POSES = 39, 32, 25.0, 50
 
 def random_head(num_gaussians: int, rank: int = 16, hidden: int = 128, seed: int = 0) -> BakedHead:
     """A head-sized ellipsoid around the origin that looks along +z; basis vector 0 darkens a
-    mouth, basis vector 1 the eyes, the others tint at random."""
+    mouth, basis vector 1 the eyes, the others tint at random. Its lower half moves up and down,
+    its front to the sides."""
     rng = np.random.default_rng(seed)
     directions = rng.normal(size=(num_gaussians, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -43,6 +44,9 @@ def random_head(num_gaussians: int, rank: int = 16, hidden: int = 128, seed: int
     basis[0, near(directions, (0, -0.35, 0.93), 0.25), :3] = -120
     for side in (-0.35, 0.35):
         basis[min(1, rank - 1), near(directions, (side, 0.2, 0.91), 0.18), :3] = -120
+    moves = np.zeros((2, num_gaussians, 3), np.int8)
+    moves[0, :, 1] = 127 * np.clip(-directions[:, 1], 0, 1)
+    moves[1, :, 0] = 127 * np.clip(directions[:, 2], 0, 1)
     return BakedHead(
         means=means,
         quats=quats.astype(np.float16),
@@ -50,6 +54,10 @@ def random_head(num_gaussians: int, rank: int = 16, hidden: int = 128, seed: int
         mean_logits=mean_logits.astype(np.float16),
         basis=basis,
         basis_scale=np.full(num_gaussians, 0.02, np.float32),
+        displacement_basis=moves,
+        displacement_map=np.random.default_rng([seed, 1])
+        .normal(0, 1e-5, (EXPRESSION_SIZE + 1, 2))
+        .astype(np.float32),
         w1=rng.normal(0, 0.5, (EXPRESSION_SIZE, hidden)).astype(np.float32),
         b1=rng.normal(0, 0.5, hidden).astype(np.float32),
         w2=rng.normal(0, 0.3, (hidden, rank)).astype(np.float32),
@@ -121,6 +129,7 @@ def random_manifest(head: BakedHead) -> Manifest:
             fps=FPS,
             num_poses=NUM_POSES,
             idle_expression=(0.0,) * EXPRESSION_SIZE,
+            num_displacements=head.num_displacements,
         ),
         body=None,
         speech=SpeechInfo(encoder="builtin", sha256="0" * 64, fps=25.0, input="mel"),

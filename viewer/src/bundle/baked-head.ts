@@ -1,21 +1,24 @@
 import type { HeadInfo } from './manifest.ts';
 import { takeTensor, type Tensor } from './safetensors.ts';
 
-/** Gaussians of a head: N of them, with K basis vectors. */
+/** Gaussians of a head: N of them, with K basis vectors, and M displacements. */
 export interface HeadRows {
   count: number; // N
   rank: number; // K
+  moves: number; // M
   means: Float32Array; // (N,3) metres
   quats: Float32Array; // (N,4) wxyz
   scales: Float32Array; // (N,3) log of metres
   meanLogits: Float32Array; // (N,4) r, g, b, opacity
   basis: Int8Array; // (K,N,4)
   basisScale: Float32Array; // (N,)
+  displacements: Int8Array; // (M,N,3)
 }
 
 /** A baked head (`docs/bundle.md`): its Gaussians, or the most important ones, and a small network from B values. */
 export interface BakedHead extends HeadRows {
   network: Network;
+  displacementMap: Float32Array; // (B+1,M) from an expression and a 1 to metres per unit of displacements
 }
 
 /** c(e) = LeakyReLU(e·w1 + b1)·w2 + b2. */
@@ -31,11 +34,12 @@ export interface Network {
 
 /** Takes a head's tensors out of its first file, checked against the manifest's counts. */
 export function readBakedHead(tensors: Map<string, Tensor>, head: HeadInfo, file: string): BakedHead {
-  const { num_gaussians: n, num_rest: rest, rank: k, hidden: h, expression_size: b } = head;
+  const { num_gaussians: n, num_rest: rest, num_displacements: m, rank: k, hidden: h, expression_size: b } = head;
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;
   return {
-    ...readHeadRows(tensors, n - rest, k, file),
+    ...readHeadRows(tensors, n - rest, k, m, file),
+    displacementMap: m ? take('displacement_map', 'F32', [b + 1, m]) : new Float32Array(0),
     network: {
       inputs: b,
       hidden: h,
@@ -48,18 +52,20 @@ export function readBakedHead(tensors: Map<string, Tensor>, head: HeadInfo, file
   };
 }
 
-/** Takes `n` Gaussians of a head with `k` basis vectors out of a file. */
-export function readHeadRows(tensors: Map<string, Tensor>, n: number, k: number, file: string): HeadRows {
+/** Takes `n` Gaussians of a head with `k` basis vectors and `m` displacements out of a file. */
+export function readHeadRows(tensors: Map<string, Tensor>, n: number, k: number, m: number, file: string): HeadRows {
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;
   return {
     count: n,
     rank: k,
+    moves: m,
     means: take('means', 'F32', [n, 3]),
     quats: take('quats', 'F16', [n, 4]),
     scales: take('scales', 'F16', [n, 3]),
     meanLogits: take('mean_logits', 'F16', [n, 4]),
     basis: take('basis', 'I8', [k, n, 4]),
     basisScale: take('basis_scale', 'F32', [n]),
+    displacements: m ? take('displacement_basis', 'I8', [m, n, 3]) : new Int8Array(0),
   };
 }

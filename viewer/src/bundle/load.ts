@@ -134,8 +134,8 @@ export class BundleFiles {
   }
 
   /** The less important Gaussians of a head, which have a file of their own. */
-  async headRest({ num_rest, rank }: HeadInfo): Promise<HeadRows> {
-    return readHeadRows(await this.tensors(HEAD_REST), num_rest, rank, HEAD_REST);
+  async headRest({ num_rest, rank, num_displacements }: HeadInfo): Promise<HeadRows> {
+    return readHeadRows(await this.tensors(HEAD_REST), num_rest, rank, num_displacements, HEAD_REST);
   }
 
   /** How a whole person moves. */

@@ -34,6 +34,7 @@ export interface HeadInfo {
   num_poses: number;
   idle_expression: number[];
   num_rest: number; // of the Gaussians, in a file of their own
+  num_displacements: number; // ways in which Gaussians move with the expression
 }
 
 /** A span of the body's frames, both ends inside, with Gaussians of its own. */
@@ -122,7 +123,7 @@ export function checkManifest(value: unknown): Manifest {
   const { camera, background } = manifest;
   checkFiles(manifest.files);
   const body = manifest.body ?? null; // older manifests do not know of it
-  const head = manifest.head && { ...manifest.head, num_rest: manifest.head.num_rest ?? 0 };
+  const head = manifest.head && withHeadDefaults(manifest.head);
   const skinned = manifest.skinned ? withDefaults(manifest.skinned) : null;
   if (!head && !body && !skinned) bad('head');
   if (body && skinned) bad('skinned');
@@ -164,6 +165,10 @@ export function isSynthetic({ kind }: { kind: string }): boolean {
   return kind === 'synthetic';
 }
 
+function withHeadDefaults(info: HeadInfo): HeadInfo {
+  return { ...info, num_rest: info.num_rest ?? 0, num_displacements: info.num_displacements ?? 0 };
+}
+
 function withDefaults(info: SkinnedInfo): SkinnedInfo {
   return { ...info, num_casters: info.num_casters ?? 0, num_rest: info.num_rest ?? 0 };
 }
@@ -180,6 +185,7 @@ function checkHead(head: HeadInfo): void {
   if (!isCount(head.num_gaussians, MAX_GAUSSIANS)) bad('head.num_gaussians'); // room is made for all before the last ones come
   if (!isPositive(head.fps)) bad('head.fps');
   if (!isRest(head.num_rest, head.num_gaussians)) bad('head.num_rest');
+  if (head.num_displacements !== 0 && !isCount(head.num_displacements, MOST.displacements)) bad('head.num_displacements');
   if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
 }
 

@@ -1,6 +1,6 @@
 import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
 import { GrowingGenerator } from '../gaussians/growing.ts';
-import { coefficients } from './coefficients.ts';
+import { coefficients, steps } from './coefficients.ts';
 import { MOTION_SIZE, STILL } from './shoulders.ts';
 import { SoftHead, type ShownRows } from './soft.ts';
 
@@ -8,13 +8,16 @@ import { SoftHead, type ShownRows } from './soft.ts';
 export class HeadGenerator extends GrowingGenerator {
   /** The first Gaussians, and those that came later. */
   readonly parts: ShownRows[];
-  /** Coefficients of the expression shown (K,), and the motion of the shoulders (7,). */
+  /** Coefficients of the expression shown (K,), its steps (M,), and the motion of the shoulders (7,). */
   readonly values: Float32Array;
   readonly shown: Float32Array;
+  /** Metres of a unit of each displacement. */
+  readonly steps: Float32Array;
   /** How the shoulders have moved against the head: rotation wxyz, shift. */
   readonly bent: Float32Array;
   readonly soft: SoftHead;
   private readonly network: BakedHead['network'];
+  private readonly displacementMap: Float32Array;
   private readonly share: Uint8Array;
 
   /**
@@ -25,12 +28,15 @@ export class HeadGenerator extends GrowingGenerator {
     super(capacity, head.count);
     this.share = share;
     this.parts = [{ ...head, share: share.subarray(0, head.count) }];
-    this.values = new Float32Array(head.rank + MOTION_SIZE);
+    const moved = head.rank + head.moves;
+    this.values = new Float32Array(moved + MOTION_SIZE);
     this.shown = this.values.subarray(0, head.rank);
-    this.bent = this.values.subarray(head.rank);
+    this.steps = this.values.subarray(head.rank, moved);
+    this.bent = this.values.subarray(moved);
     this.bent.set(STILL);
     this.soft = new SoftHead(this);
     this.network = head.network;
+    this.displacementMap = head.displacementMap;
   }
 
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
@@ -49,6 +55,7 @@ export class HeadGenerator extends GrowingGenerator {
   /** Shows an expression (B,) from the next frame on. */
   express(expression: Float32Array): void {
     coefficients(this.network, expression, this.shown);
+    steps(this.displacementMap, expression, this.steps);
     this.changed();
   }
 }

@@ -10,7 +10,7 @@ export interface ShownRows extends HeadRows {
 /** A head as it is now. */
 export interface HeadNow {
   readonly parts: readonly ShownRows[];
-  readonly values: Float32Array; // (K,) coefficients, (7,) motion of the shoulders
+  readonly values: Float32Array; // (K,) coefficients, (M,) steps, (7,) motion of the shoulders
   readonly grown: number; // share of what came after the first part that is seen
   readonly wide: number; // by which sizes of the first part are multiplied
 }
@@ -42,8 +42,8 @@ export class SoftHead implements SoftObject {
   }
 }
 
-function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis, share }: ShownRows): Source {
-  const stride = ROW_BYTES.head + 4 * rank;
+function pack({ count, rank, moves, means, quats, scales, basisScale, meanLogits, basis, displacements, share }: ShownRows): Source {
+  const stride = ROW_BYTES.head + 4 * (rank + moves);
   const { rows, floats } = makeRows(count, stride);
   const bytes = new Int8Array(rows);
   for (let i = 0; i < count; i++) {
@@ -58,6 +58,10 @@ function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis
       const from = 4 * (count * k + i);
       bytes.set(basis.subarray(from, from + 4), i * stride + ROW_BYTES.head + 4 * k);
     }
+    for (let m = 0; m < moves; m++) {
+      const from = 3 * (count * m + i);
+      bytes.set(displacements.subarray(from, from + 3), i * stride + ROW_BYTES.head + 4 * (rank + m));
+    }
   }
-  return { kind: 'head', count, rows, sizes: [rank] };
+  return { kind: 'head', count, rows, sizes: [rank, moves] };
 }

@@ -8,14 +8,14 @@ import type { ShownRows } from './soft.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
 const REST_LAYERS = 4; // centre + basis scale, quaternion, scales + share of the shoulders' motion, mean logits
-const PACKED = 4; // basis vectors in a texel: a fetch costs far more than taking them apart
+const PACKED = 4; // basis vectors or displacements in a texel: a fetch costs far more than taking them apart
 
 /** The head as Spark draws it: a shader makes Gaussian i from textures and K coefficients; no opacity is ever 0 (sigmoid). */
 export class SparkHead extends SparkTwin {
   constructor(head: HeadGenerator) {
     const [first] = head.parts;
-    const { rank, count } = first!;
-    const texels = makeTexels(head.numSplats, rank);
+    const { rank, moves, count } = first!;
+    const texels = makeTexels(head.numSplats, rank, moves);
     const grown = { value: head.grown };
     const wide = { value: head.wide };
     let filled = 0; // parts
@@ -33,20 +33,22 @@ export class SparkHead extends SparkTwin {
       headRest: { value: texels.rest },
       headBasis: { value: texels.basis },
       headCoefficients: { value: head.shown },
+      headSteps: { value: moves ? head.steps : new Float32Array(1) },
       headFirst: { value: count },
       headGrown: grown,
       headWide: wide,
       headBend: { value: head.bent },
     };
-    super(head, { declarations: declarations(rank), uniforms, statements: (index, gsplat) => statements(rank, index, gsplat) }, follow);
+    super(head, { declarations: declarations(rank, moves), uniforms, statements: (index, gsplat) => statements(rank, moves, index, gsplat) }, follow);
   }
 }
 
-function declarations(rank: number): string {
+function declarations(rank: number, moves: number): string {
   return dyno.unindent(`
     uniform sampler2DArray headRest;
     uniform usampler2DArray headBasis;
     uniform float headCoefficients[${rank}];
+    uniform float headSteps[${Math.max(moves, 1)}];
     uniform int headFirst;
     uniform float headGrown;
     uniform float headWide;
@@ -60,16 +62,17 @@ function declarations(rank: number): string {
   `);
 }
 
-/** logits = mean + scale · Σ c·U; rgb, opacity = sigmoid(logits). */
-function statements(rank: number, index: string, gsplat: string): string[] {
+/** logits = mean + scale · Σ c·U; rgb, opacity = sigmoid(logits); centre = mean + Σ d·D. */
+function statements(rank: number, moves: number, index: string, gsplat: string): string[] {
   const fetches = Array.from(
-    { length: Math.ceil(rank / PACKED) },
+    { length: layersOf(rank) + layersOf(moves) },
     (_, i) => `uvec4 u${i} = texelFetch(headBasis, ivec3(texel, ${i}), 0);`,
   );
-  const terms = Array.from(
-    { length: rank },
-    (_, k) => `headCoefficients[${k}] * headVector(u${Math.floor(k / PACKED)}, ${24 - 8 * (k % PACKED)})`,
-  );
+  const sum = (factors: string, count: number, layer: number) =>
+    Array.from(
+      { length: count },
+      (_, k) => `${factors}[${k}] * headVector(u${layer + Math.floor(k / PACKED)}, ${24 - 8 * (k % PACKED)})`,
+    ).join(' + ');
   return dyno.unindentLines(`
     ${gsplat}.flags = 0u;
     ${gsplat}.index = ${index};
@@ -78,10 +81,10 @@ function statements(rank: number, index: string, gsplat: string): string[] {
       ivec2 texel = ivec2(${index} % ${WIDTH}, ${index} / ${WIDTH});
       vec4 centreAndScale = texelFetch(headRest, ivec3(texel, 0), 0);
       ${fetches.join(' ')}
-      vec4 blend = ${terms.join(' + ')};
+      vec4 blend = ${sum('headCoefficients', rank, 0)};
       vec4 logits = texelFetch(headRest, ivec3(texel, 3), 0) + centreAndScale.w * blend;
       ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
-      ${gsplat}.center = centreAndScale.xyz;
+      ${gsplat}.center = centreAndScale.xyz${moves ? ` + (${sum('headSteps', moves, layersOf(rank))}).xyz` : ''};
       ${gsplat}.quaternion = texelFetch(headRest, ivec3(texel, 1), 0);
       vec4 scalesAndShare = texelFetch(headRest, ivec3(texel, 2), 0);
       ${gsplat}.scales = scalesAndShare.xyz * (${index} < headFirst ? headWide : 1.0);
@@ -101,13 +104,17 @@ function statements(rank: number, index: string, gsplat: string): string[] {
 /** Textures of a fixed number of Gaussians, one texel each. */
 interface Texels {
   rest: THREE.DataArrayTexture;
-  basis: THREE.DataArrayTexture; // r, g, b, opacity, each number with a byte of four basis vectors
+  basis: THREE.DataArrayTexture; // r, g, b, opacity, each number with a byte of four basis vectors; then x, y, z of four displacements
 }
 
-function makeTexels(capacity: number, rank: number): Texels {
+function layersOf(vectors: number): number {
+  return Math.ceil(vectors / PACKED);
+}
+
+function makeTexels(capacity: number, rank: number, moves: number): Texels {
   const rows = Math.ceil(capacity / WIDTH);
   const layer = 4 * WIDTH * rows;
-  const layers = Math.ceil(rank / PACKED);
+  const layers = layersOf(rank) + layersOf(moves);
   const rest = new THREE.DataArrayTexture(new Float32Array(REST_LAYERS * layer), WIDTH, rows, REST_LAYERS);
   rest.type = THREE.FloatType;
   rest.internalFormat = 'RGBA32F';
@@ -139,12 +146,16 @@ function fillRest(texels: Float32Array, height: number, rows: ShownRows, begin: 
   }
 }
 
-function fillBasis(texels: Uint32Array, height: number, { count, rank, basis }: HeadRows, begin: number): void {
+function fillBasis(texels: Uint32Array, height: number, { count, rank, moves, basis, displacements }: HeadRows, begin: number): void {
   const layer = 4 * WIDTH * height;
   const bytes = new Int8Array(texels.buffer); // little-endian, as every device with WebGL is
   for (let k = 0; k < rank; k++) {
     const first = PACKED * (Math.floor(k / PACKED) * layer + 4 * begin) + (k % PACKED);
     for (let i = 0; i < 4 * count; i++) bytes[first + PACKED * i] = basis[4 * count * k + i]!;
+  }
+  for (let m = 0; m < moves; m++) {
+    const first = PACKED * ((layersOf(rank) + Math.floor(m / PACKED)) * layer + 4 * begin) + (m % PACKED);
+    for (let i = 0; i < 3 * count; i++) bytes[first + PACKED * (i + Math.floor(i / 3))] = displacements[3 * count * m + i]!;
   }
 }
 

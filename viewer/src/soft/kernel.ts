@@ -8,7 +8,7 @@ export interface Kernel {
   begin(fx: number, fy: number, cx: number, cy: number, width: number, height: number, first: number, end: number): void;
   fade(first: number, share: number, wide: number): void;
   addStill(view: number, rows: number, count: number): void;
-  addHead(view: number, rows: number, count: number, values: number, rank: number): void;
+  addHead(view: number, rows: number, count: number, values: number, rank: number, moves: number): void;
   addWindow(view: number, rows: number, count: number, values: number, positions: number, rotations: number, scales: number, row: number): void;
   addSkinned(view: number, rows: number, count: number, values: number, shapes: number, joints: number, side: number): void;
   bin(all: number): number;

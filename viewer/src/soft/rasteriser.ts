@@ -159,7 +159,7 @@ export class Rasteriser {
     const [a, b, c, d] = source.sizes;
     kernel.fade(late?.first ?? count, late?.share ?? 1, late?.wide ?? 1);
     if (source.kind === 'still') kernel.addStill(from, at, count);
-    else if (source.kind === 'head') kernel.addHead(from, at, count, given, a!);
+    else if (source.kind === 'head') kernel.addHead(from, at, count, given, a!, b!);
     else if (source.kind === 'window') kernel.addWindow(from, at, count, given, a!, b!, c!, d!);
     else kernel.addSkinned(from, at, count, given, a!, b!, c!);
   }

@@ -5,7 +5,8 @@
  * metres (3), and from byte 40 on
  *
  * - `still`: colour (3), opacity.
- * - `head`: scale of the basis, mean logits (4), share of the shoulders' motion; from byte 64 the K basis vectors, 4 i8 each.
+ * - `head`: scale of the basis, mean logits (4), share of the shoulders' motion; from byte 64 the K basis vectors, 4 i8
+ *   each, and the M displacements, 3 i8 and nothing each.
  * - `window`: colour (3), opacity, cluster (u32); from byte 64 the P + R + L basis vectors, 4 i16 each.
  * - `skinned`: colour logits (3), opacity, nothing, normal (3), metres and logits per unit of the
  *   shapes, joints (4 u8), weights (4 u8); from byte 96 the K shapes, 8 i8 each: position, 0, logits, 0.
@@ -15,7 +16,7 @@ export interface Source {
   count: number; // Gaussians
   rows: ArrayBuffer;
   /**
-   * - `head`: K.
+   * - `head`: K, M.
    * - `window`: P, R, L, numbers in a cluster's row of values.
    * - `skinned`: K, joints, texels along a side of the shadow map or 0.
    */
@@ -45,7 +46,7 @@ export interface SoftObject {
   /**
    * What changes from picture to picture.
    *
-   * - `head`: K coefficients; motion of the shoulders, rotation wxyz and shift (7).
+   * - `head`: K coefficients; M steps, metres; motion of the shoulders, rotation wxyz and shift (7).
    * - `window`: a row for each cluster.
    * - `skinned`: light (8,4), lamp (5,4), K ≤ 8 coefficients of the shapes in 8 places, table of joints
    *   (J,16), shadow map.

@@ -156,7 +156,7 @@ describe('the rasteriser', () => {
     const light = [50, 50, 50, 0]; // logits: white, half opaque
     const head = [-0.5, 0.5].flatMap((aside) => [aside, 0, 2, 1, 0, 0, 0, 0.1, 0.1, 0.1, 0, ...light, 0]);
     const one = new Rasteriser(await makeKernel());
-    one.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head).buffer, sizes: [0] });
+    one.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head).buffer, sizes: [0, 0] });
     const black = clothOf([0, 0, 0], WIDTH, HEIGHT);
     const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
     const shine = (share: number, wide = 1, from = one, aside = 0) => {
@@ -173,7 +173,7 @@ describe('the rasteriser', () => {
       expect(Math.abs(after! - share * first!)).toBeLessThanOrEqual(1);
     }
     const wider = new Rasteriser(await makeKernel());
-    wider.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head, (value, i) => ([7, 8, 9].includes(i) ? 2 * value : value)).buffer, sizes: [0] });
+    wider.put(0, { kind: 'head', count: 2, rows: Float32Array.from(head, (value, i) => ([7, 8, 9].includes(i) ? 2 * value : value)).buffer, sizes: [0, 0] });
     const aside = 8; // pixels
     expect(shine(0.5, 2, one, aside)).toEqual(shine(0.5, 1, wider, aside));
     expect(shine(0.5, 2, one, aside)).not.toEqual(shine(0.5, 1, one, aside));
@@ -189,7 +189,7 @@ describe('the rasteriser', () => {
     const moved = Float32Array.of(cosine, -sine, 0, shift[0]!, sine, cosine, 0, shift[1]!, 0, 0, 1, shift[2]!);
     const draw = async (share: number, view: Float32Array) => {
       const one = new Rasteriser(await makeKernel());
-      one.put(0, { kind: 'head', count: 1, rows: rows(share).buffer as ArrayBuffer, sizes: [0] });
+      one.put(0, { kind: 'head', count: 1, rows: rows(share).buffer as ArrayBuffer, sizes: [0, 0] });
       const placed = [{ id: 0, view, drawn: 1, values: motion }];
       return one.draw({ lens: [100, 100, 100, 75], width: WIDTH, height: HEIGHT, band: [0, COLUMNS], placed }, background).slice();
     };
@@ -197,6 +197,36 @@ describe('the rasteriser', () => {
     expect(worst(await draw(1, still), expected)).toBeLessThanOrEqual(1);
     expect(worst(await draw(0, still), expected)).toBeGreaterThan(30);
     expect(worst(await draw(0.5, still), expected)).toBeGreaterThan(30);
+  });
+
+  test('moves the Gaussians of a head by their displacements, and then with the shoulders', async () => {
+    const light = [3, 1, -1, 2];
+    const row = (x: number, y: number, z: number, share: number) => [x, y, z, 0.8, 0.1, 0.5, -0.3, 0.2, 0.05, 0.1, 0.01, ...light, share];
+    const basis = [100, -50, 3, 7]; // of the logits
+    const moves = [[50, -20, 100, 0], [-128, 127, 0, 0]]; // the fourth number has no meaning
+    const bytes = (floats: number[], more: number[]) => {
+      const rows = new Uint8Array(64 + more.length);
+      rows.set(new Uint8Array(Float32Array.from(floats).buffer));
+      rows.set(Int8Array.from(more), 64);
+      return rows.buffer as ArrayBuffer;
+    };
+    const [steps, shoulders] = [[0.004, -0.001], [Math.cos(0.2), 0, Math.sin(0.2), 0, 0.1, 0, 0]];
+    const [x, y, z] = [0.3, -0.2, 2];
+    const by = [0, 1, 2].map((k) => steps[0]! * moves[0]![k]! + steps[1]! * moves[1]![k]!);
+    const still = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
+    const draw = async (rows: ArrayBuffer, sizes: number[], values: number[]) => {
+      const one = new Rasteriser(await makeKernel());
+      one.put(0, { kind: 'head', count: 1, rows, sizes });
+      const placed = [{ id: 0, view: still, drawn: 1, values: Float32Array.from(values) }];
+      return one.draw({ lens: [100, 100, 100, 75], width: WIDTH, height: HEIGHT, band: [0, COLUMNS], placed }, background).slice();
+    };
+    for (const share of [0, 0.5]) {
+      const moving = bytes(row(x, y, z, share), [...basis, ...moves.flat()]);
+      const there = bytes(row(x + by[0]!, y + by[1]!, z + by[2]!, share), basis);
+      const expected = await draw(there, [1, 0], [0.7, ...shoulders]);
+      expect(worst(await draw(moving, [1, 2], [0.7, ...steps, ...shoulders]), expected)).toBeLessThanOrEqual(1);
+      expect(worst(await draw(moving, [1, 2], [0.7, 0, 0, ...shoulders]), expected)).toBeGreaterThan(30);
+    }
   });
 
   test('draws where the background changed anew, and nothing else', async () => {

@@ -27,12 +27,15 @@ function makeHead(origin = 0): BakedHead {
   return {
     count: COUNT,
     rank: 1,
+    moves: 0,
     means,
     quats: new Float32Array(4 * COUNT),
     scales: new Float32Array(3 * COUNT),
     meanLogits: Float32Array.from({ length: 4 * COUNT }, (_, i) => (i % 4 === 3 ? 3 : 0)),
     basis,
     basisScale: new Float32Array(COUNT).fill(0.02),
+    displacements: new Int8Array(0),
+    displacementMap: new Float32Array(0),
     network: { ...network, b1: new Float32Array(1), w2: new Float32Array([1]), b2: new Float32Array(1) },
   };
 }

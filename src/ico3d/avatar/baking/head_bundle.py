@@ -216,7 +216,7 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
     """A baked head that takes the expressions that drive avatars, instead of recorded ones.
 
     `TrainedHead.recorded` converts them, value by value and linearly, so it is merged into the
-    first layer of the coefficient network.
+    first layer of the coefficient network, and into the map of the displacements.
 
     Args:
         baked: Takes expressions as they were recorded.
@@ -226,7 +226,14 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
     offset = head.recorded(np.zeros(size, np.float32))  # (B,)
     slope = head.recorded(np.ones(size, np.float32)) - offset  # (B,)
     bias = baked.b1 + offset.astype(np.float64) @ baked.w1
-    return replace(baked, w1=slope[:, None] * baked.w1, b1=bias.astype(np.float32))
+    rows, rest = baked.displacement_map[:-1], baked.displacement_map[-1:]
+    moved = np.concatenate([slope[:, None] * rows, rest + offset[None] @ rows])  # (B + 1, M)
+    return replace(
+        baked,
+        w1=slope[:, None] * baked.w1,
+        b1=bias.astype(np.float32),
+        displacement_map=moved.astype(np.float32),
+    )
 
 
 def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
@@ -268,4 +275,5 @@ def head_info(
         fps=fps,
         num_poses=num_poses,
         idle_expression=tuple(round(float(value), 6) for value in idle),
+        num_displacements=baked.num_displacements,
     )

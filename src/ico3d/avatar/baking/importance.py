@@ -45,7 +45,7 @@ def logit_importance(
         with torch.no_grad():
             logits = model.logits(expression)
         logits.requires_grad_(True)
-        gaussians = model.gaussians(logits)
+        gaussians = model.gaussians(logits, model.moves(expression))
         still = (gaussians.means, gaussians.quats, gaussians.scales)
         gaussians.means, gaussians.quats, gaussians.scales = (part.detach() for part in still)
         image = render(gaussians, [camera], background).rgb[0]  # (H, W, 3)

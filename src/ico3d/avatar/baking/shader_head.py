@@ -8,7 +8,7 @@ import torch
 from ico3d.avatar.baking.distil import CoefficientNetwork, augmented, distil
 from ico3d.avatar.baking.lowrank import LowRank, factorise
 from ico3d.avatar.baking.quantise import quantise
-from ico3d.bundle.head import BakedHead
+from ico3d.bundle.head import BakedHead, no_displacements
 from ico3d.common.spread import spread
 from ico3d.errors import BundleError
 from ico3d.head.model import HeadModel
@@ -81,6 +81,7 @@ class HeadBaker:
         network = self._network
         return BakedHead(
             **_geometry(self._model, self._kept),
+            **_displacements(self._model, self._kept),
             mean_logits=self._factors.mean.reshape(count, 4).astype(np.float16),
             basis=rounded.values,
             basis_scale=rounded.scale,
@@ -128,6 +129,19 @@ def _geometry(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
         "means": np.ascontiguousarray(means, np.float32),
         "quats": quats.astype(np.float16),
         "scales": log_scales.astype(np.float16),
+    }
+
+
+def _displacements(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
+    """Displacements in 8-bit numbers, with the size of a unit in the map."""
+    if not model.shape.displacements:
+        return no_displacements(len(kept), model.shape.expression_size)
+    basis = model.displacement_basis.detach().cpu().numpy()[:, kept]  # (M, N, 3)
+    units = np.maximum(np.abs(basis).max(axis=(1, 2)) / 127, 1e-9)  # (M,)
+    mapping: torch.Tensor = model.displacement_map  # type: ignore[assignment]
+    return {
+        "displacement_basis": np.rint(basis / units[:, None, None]).astype(np.int8),
+        "displacement_map": (mapping.cpu().numpy() * units).astype(np.float32),  # (B + 1, M)
     }
 
 

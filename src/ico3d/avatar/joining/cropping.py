@@ -7,7 +7,7 @@ import torch
 
 from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import ModelError
-from ico3d.head.model import GAUSSIAN_AXES, HeadModel
+from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 
 
@@ -29,8 +29,7 @@ def _selected(model: HeadModel, keep: torch.Tensor) -> HeadModel:
     """A copy of the model with the Gaussians of some indices (K,)."""
     chosen = HeadModel(model.shape, len(keep))
     values = dict(model.state_dict())
-    axes = GAUSSIAN_AXES | ({"light": 0} if model.shape.relit else {})
-    for name, axis in axes.items():
+    for name, axis in model.gaussian_axes.items():
         values[name] = values[name].index_select(axis, keep.to(values[name].device))
     chosen.load_state_dict(values)
     return chosen

@@ -10,7 +10,7 @@ from typing import Any
 from ico3d.bundle import evaluate, limits, manifest
 from ico3d.chat.observing.timing import PARTS
 from ico3d.chat.wire.protocol_visits import MAX_NOTE, MAX_NOTES
-from ico3d.common.expression import EYE_NAMES, LIDS
+from ico3d.common.expression import EYE_NAMES, LIDS, MOST_DISPLACEMENTS
 from ico3d.common.spz import container
 from ico3d.motion import roles
 from ico3d.rig import shadow_map
@@ -40,6 +40,7 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
         "What else a bundle may have: a head's counts, a body's frames, bytes of a file.",
         {
             "rank": limits.MAX_RANK,
+            "displacements": MOST_DISPLACEMENTS,
             "hidden": limits.MAX_HIDDEN,
             "expression_size": limits.MAX_EXPRESSION_SIZE,
             "num_poses": limits.MAX_POSES,

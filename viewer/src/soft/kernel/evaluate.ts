@@ -9,7 +9,7 @@ import { heldPowerOfTwo, sigmoid } from './vectors.ts';
  */
 
 const STILL: usize = 64;
-const HEAD: usize = 64; // and 4 bytes for each basis vector
+const HEAD: usize = 64; // and 4 bytes for each basis vector and displacement
 const WINDOW: usize = 64; // and 8 bytes for each basis vector
 const SKINNED: usize = 96; // and 8 bytes for each shape
 const LEAST_SCALE: f32 = 1e-6; // m
@@ -53,15 +53,15 @@ let turnX: f32 = 0;
 let turnY: f32 = 0;
 let turnZ: f32 = 0;
 
-/** Moves a Gaussian of a head by its share of the shoulders' motion. */
+/** Moves a Gaussian of a head that was taken by its share of the shoulders' motion. */
 function bend(at: usize, motion: usize, share: f32): void {
   const w = load<f32>(motion);
   const i = load<f32>(motion, 4);
   const j = load<f32>(motion, 8);
   const k = load<f32>(motion, 12);
-  const x = load<f32>(at);
-  const y = load<f32>(at, 4);
-  const z = load<f32>(at, 8);
+  const x = atX;
+  const y = atY;
+  const z = atZ;
   const ax = j * z - k * y + w * x;
   const ay = k * x - i * z + w * y;
   const az = i * y - j * x + w * z;
@@ -95,13 +95,32 @@ function take(at: usize): void {
   turnZ = load<f32>(at, 24);
 }
 
+/** Eight-bit numbers at an address, as floating-point ones. */
+// @ts-ignore: decorator
+@inline
+function four(at: usize): v128 {
+  return f32x4.convert_i32x4_s(i32x4.extend_low_i16x8_s(i16x8.extend_low_i8x16_s(v128.load32_zero(at))));
+}
+
+/** Moves a Gaussian of a head that was taken by displacements at an address, so many metres per unit. */
+function displace(at: usize, steps: usize, moves: i32): void {
+  let sum = f32x4.splat(0);
+  for (let m: usize = 0; m < <usize>moves; m++) {
+    sum = f32x4.add(sum, f32x4.mul(v128.load32_splat(steps + (m << 2)), four(at + (m << 2))));
+  }
+  atX += f32x4.extract_lane(sum, 0);
+  atY += f32x4.extract_lane(sum, 1);
+  atZ += f32x4.extract_lane(sum, 2);
+}
+
 /**
  * A head: logits = mean + scale · Σ c·U; colour, opacity = sigmoid(logits). `values` are the
- * coefficients, and the motion of the shoulders.
+ * coefficients, the steps of the displacements, and the motion of the shoulders.
  */
-export function addHead(view: usize, rows: usize, count: i32, values: usize, rank: i32): void {
-  const stride = HEAD + 4 * <usize>rank;
-  const motion = values + 4 * <usize>rank;
+export function addHead(view: usize, rows: usize, count: i32, values: usize, rank: i32, moves: i32): void {
+  const moving = 4 * <usize>rank; // bytes before displacements, and before their steps
+  const stride = HEAD + moving + 4 * <usize>moves;
+  const motion = values + moving + 4 * <usize>moves;
   const end = rows + stride * <usize>count;
   const fading = rows + stride * <usize>min(late, count);
   for (let at = rows; at < end; at += stride) {
@@ -110,14 +129,13 @@ export function addHead(view: usize, rows: usize, count: i32, values: usize, ran
     const s1 = wide * load<f32>(at, 32);
     const s2 = wide * load<f32>(at, 36);
     const share = load<f32>(at, 60);
+    take(at);
+    if (moves > 0) displace(at + HEAD + moving, values + moving, moves);
     if (share > 0) bend(at, motion, share);
-    else take(at);
     if (!approach(view, atX, atY, atZ, max(s0, max(s1, s2)))) continue;
     let blend = f32x4.splat(0);
     for (let k: usize = 0; k < <usize>rank; k++) {
-      const bytes = i16x8.extend_low_i8x16_s(v128.load32_zero(at + HEAD + (k << 2)));
-      const vector = f32x4.convert_i32x4_s(i32x4.extend_low_i16x8_s(bytes));
-      blend = f32x4.add(blend, f32x4.mul(v128.load32_splat(values + (k << 2)), vector));
+      blend = f32x4.add(blend, f32x4.mul(v128.load32_splat(values + (k << 2)), four(at + HEAD + (k << 2))));
     }
     const light = sigmoid(f32x4.add(v128.load(at, 44), f32x4.mul(v128.load32_splat(at, 40), blend)));
     const opacity: f32 = f32x4.extract_lane(light, 3) * (at < fading ? ONE : lateShare);

@@ -1,0 +1,107 @@
+"""Displacements of a head's Gaussians: skin goes where the landmarks of the face go.
+
+In the paper a head's Gaussians stand still and change colour and opacity. A chin that goes down as
+the mouth opens is then a chin that fades here and appears there, and is soft on the way.
+
+Sound does not tell all of where lips are. So skin is learnt where landmarks were seen to be, and
+what an expression tells of that place decides where it is drawn: a little off at times, but sharp.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+DAMPING = 0.01
+"""Damping of the regression from expressions, relative to the variance of a value."""
+NEAREST, FARTHEST = 0.004, 0.016
+"""Least and largest reach of a landmark in metres, else its distance from its neighbour."""
+STILL = 1.5
+"""How many reaches from a landmark skin moves half as far as the landmark does."""
+LEAST_FRAMES = 16
+"""Fewer frames with landmarks do not tell how a face moves."""
+LEAST_MOTION = 1e-6
+"""Root mean square in metres below which landmarks stand still."""
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """Displacements D(x) = Σ_m c_m · D_m(x) of a face's skin.
+
+    Attributes:
+        landmarks: (P, 3) where landmarks are on average, metres in canonical head space.
+        modes: (M, P, 3) metres by which landmarks move where a coefficient is 1; the strongest
+            first.
+        mean: (P, 3) how far landmarks are on average from where `landmarks` has them.
+    """
+
+    landmarks: np.ndarray
+    modes: np.ndarray
+    mean: np.ndarray
+
+    def coefficients(self, motion: np.ndarray) -> np.ndarray:
+        """(F, M) float32 of frames in which landmarks moved by (F, P, 3); NaN where that is.
+
+        In the frames that the modes were found in they have a mean of 0 and a root mean square
+        of 1.
+        """
+        axes = self.modes.reshape(len(self.modes), -1)  # (M, 3 · P)
+        axes = axes / np.square(axes).sum(1, keepdims=True)
+        found = (motion - self.mean).reshape(len(motion), -1) @ axes.T  # (F, M)
+        return found.astype(np.float32)
+
+    def spread(self, points: np.ndarray) -> np.ndarray:
+        """(M, N, 3) displacements D_m of points (N, 3), metres.
+
+        They are means of those of the landmarks near a point, less with the distance from the
+        nearest one.
+        """
+        between = self.landmarks[:, None] - self.landmarks  # (P, P, 3)
+        apart = np.linalg.norm(between, axis=-1) + np.diag(np.full(len(between), np.inf))
+        reach = np.clip(apart.min(1), NEAREST, FARTHEST)  # (P,)
+        away = np.linalg.norm(points[:, None] - self.landmarks, axis=-1) / reach  # (N, P)
+        nearest = away.min(1, keepdims=True)  # (N, 1)
+        weights = np.exp(0.5 * (nearest**2 - away**2))
+        weights /= weights.sum(1, keepdims=True) * (1 + (nearest / STILL) ** 4)
+        return np.einsum("np,mpc->mnc", weights, self.modes)
+
+
+def principal(landmarks: np.ndarray, motion: np.ndarray, count: int) -> Displacement | None:
+    """The principal components of how landmarks move.
+
+    Args:
+        landmarks: (P, 3) where landmarks are on average.
+        motion: (F, P, 3) how far they are from there in frames, metres; NaN where it is not known.
+        count: Largest number M of displacements.
+
+    Returns:
+        None where too few frames are known, or nothing moves.
+    """
+    known = np.isfinite(motion).all((1, 2))
+    if known.sum() < LEAST_FRAMES:
+        return None
+    flat = motion[known].reshape(known.sum(), -1)  # (F', 3 · P)
+    mean = flat.mean(0)  # (3 · P,)
+    _, sizes, axes = np.linalg.svd(flat - mean, full_matrices=False)
+    sizes = sizes[:count] / np.sqrt(len(flat))
+    sizes = sizes[sizes > LEAST_MOTION * np.sqrt(motion.shape[1])]
+    if not len(sizes):
+        return None
+    modes = (axes[: len(sizes)] * sizes[:, None]).reshape(len(sizes), -1, 3)
+    return Displacement(landmarks, modes, mean.reshape(-1, 3))
+
+
+def told(expressions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """(B + 1, M) float32 from an expression and a 1 to coefficients, by ridge regression.
+
+    Args:
+        expressions: (F, B) expressions of frames.
+        coefficients: (F, M) of the same frames; rows that are not known are NaN.
+    """
+    known = np.isfinite(coefficients).all(1)
+    inputs, targets = expressions[known].astype(np.float64), coefficients[known]
+    middle, size = inputs.mean(0), inputs.std(0) + 1e-6
+    unit = (inputs - middle) / size
+    gram = unit.T @ unit + DAMPING * len(unit) * np.eye(unit.shape[1])  # (B, B)
+    slope = np.linalg.solve(gram, unit.T @ (targets - targets.mean(0))) / size[:, None]  # (B, M)
+    rest = targets.mean(0) - middle @ slope  # (M,)
+    return np.concatenate([slope, rest[None]]).astype(np.float32)
