@@ -303,7 +303,7 @@ def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any
     """
     try:
         text = data.decode("utf-8")
-        _check_values(text)
+        _check_values(text, MOST_VALUES)
         return json.loads(
             text,
             object_pairs_hook=_unique_keys,
@@ -314,23 +314,27 @@ def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any
         raise error(f"{name}: is not valid JSON ({line}).") from cause
 
 
-def loose_json(data: bytes | str) -> Any:
+def loose_json(data: bytes | str, most: int = MOST_VALUES) -> Any:
     """Parses JSON that may be anybody's, as leniently as Python: NaN may be there, keys repeat.
 
+    Args:
+        data: The text.
+        most: Lists, objects and their entries that it may have.
+
     Raises:
-        ValueError: If it is no JSON in UTF-8, nested too deep, or has more than `MOST_VALUES`.
+        ValueError: If it is no JSON in UTF-8, nested too deep, or has more than `most`.
     """
     text = data if isinstance(data, str) else data.decode("utf-8-sig")
-    _check_values(text)
+    _check_values(text, most)
     try:
         return json.loads(text)
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
 
 
-def _check_values(text: str) -> None:
-    if text.count("[") + text.count("{") + text.count(",") > MOST_VALUES:
-        raise ValueError(f"it has more than {MOST_VALUES:,} values")
+def _check_values(text: str, most: int) -> None:
+    if text.count("[") + text.count("{") + text.count(",") > most:
+        raise ValueError(f"it has more than {most:,} values")
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import time
 from collections.abc import AsyncGenerator
 from typing import Any
 
-from fastapi import FastAPI, Response
+from fastapi import FastAPI, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.frames.frames import (
@@ -23,6 +23,7 @@ from pipecat.services.llm_service import FunctionCallParams
 from pipecat.services.settings import LLMSettings
 from pydantic import BaseModel, Field
 
+from ico3d.chat.remote.asked import asked
 from ico3d.chat.remote.headless import Spares, run
 from ico3d.errors import ServiceError
 
@@ -71,7 +72,8 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
     """
 
     @app.post("/v1/chat/completions")
-    async def completions(request: ChatRequest) -> Response:
+    async def completions(sent: Request) -> Response:
+        request = await asked(sent, ChatRequest)
         deltas = answered(request, spares, seconds)
         if not request.stream:
             return JSONResponse(_whole(name, [delta async for delta in deltas]))
