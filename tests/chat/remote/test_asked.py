@@ -3,15 +3,17 @@
 import json
 
 import pytest
+from starlette import formparsers
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
-from ico3d.chat.remote.asked import asked
+from ico3d.chat.remote import asked as reading
+from ico3d.chat.remote.asked import asked, form_of
 from ico3d.chat.remote.language import ChatRequest
 from ico3d.chat.remote.voice import SpeechRequest
 from ico3d.errors import ProtocolError
 
-JSON = "application/json"
+JSON, FORM = "application/json", "multipart/form-data; boundary=b"
 
 
 def request(body: bytes, kind: str = JSON) -> Request:
@@ -66,3 +68,24 @@ async def test_json_of_more_bytes_than_any_talk_is_too_large():
 async def test_what_is_wrong_is_one_sentence(body, kind, sentence):
     with pytest.raises(ProtocolError, match=sentence):
         await asked(request(body, kind), SpeechRequest)
+
+
+@pytest.mark.parametrize("more", [b"", b'filename="f"; '])
+async def test_few_heads_of_a_form_are_read(monkeypatch, more):
+    """A thousand files and a thousand fields: 2 ms each, in the loop."""
+    read = []
+    plain = formparsers.parse_options_header
+    monkeypatch.setattr(
+        formparsers, "parse_options_header", lambda head: read.append(head) or plain(head)
+    )
+    part = b'--b\r\nContent-Disposition: form-data; name="f"; %s;;;;\r\n\r\nx\r\n' % more
+    with pytest.raises(HTTPException, match="Too many") as refused:
+        async with form_of(request(part * 900 + b"--b--\r\n", FORM)):
+            pass
+    assert refused.value.status_code == 400 and len(read) < reading.MOST_FIELDS + 5
+
+
+async def test_a_form_is_multipart():
+    with pytest.raises(ProtocolError, match="must be a form"):
+        async with form_of(request(b"a=b&" * 100, "application/x-www-form-urlencoded")):
+            pass
