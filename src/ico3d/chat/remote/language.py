@@ -49,7 +49,8 @@ class Tool(BaseModel):
 class ChatRequest(BaseModel):
     """A conversation to continue; other fields, such as the model's name, are ignored."""
 
-    messages: list[dict[str, Any]] = Field(min_length=1, max_length=MOST_MESSAGES)
+    # of ten thousand that are none, each would be told: 0.1 s for 30 kB
+    messages: list[dict[str, Any]] = Field(min_length=1, max_length=MOST_MESSAGES, fail_fast=True)
     stream: bool = False
     tools: list[Tool] = Field(default=[], max_length=MOST_TOOLS)
     temperature: float | None = None
