@@ -9,6 +9,7 @@ import pytest
 from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError
 from support.recordings.synthetic_folder import write_synthetic
+from support.strangers.claimed import write_crowded
 
 
 @pytest.fixture
@@ -77,3 +78,9 @@ def test_half_a_sample_is_no_sound(folder):
     file = folder / "audio.wav"
     file.write_bytes(file.read_bytes()[:-1])
     fails(lambda: open_capture(folder).audio(), "audio.wav", "damaged")
+
+
+def test_frames_of_thousands_of_tensors_are_not_read(folder):
+    write_crowded(folder / "frames.safetensors")
+    with pytest.raises(CaptureError, match="is missing or damaged"):
+        open_capture(folder)

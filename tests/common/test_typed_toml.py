@@ -2,12 +2,13 @@
 
 import json
 import time
+import tomllib
 
 import pytest
 
 from ico3d.bundle.persona import read_persona
 from ico3d.chat.settings.conversation import MOST_BYTES, read_settings
-from ico3d.common.typed import loose_json, parse_toml
+from ico3d.common.typed import loose_json, parse_json, parse_toml
 from ico3d.errors import BundleError, SettingsError
 
 
@@ -41,8 +42,16 @@ def test_settings_without_an_end_are_not_read(tmp_path):
 
 
 @pytest.mark.parametrize("value", ["[]", '{"a":1}'])
-def test_json_of_millions_of_values_is_not_parsed(monkeypatch, value):
+@pytest.mark.parametrize("parse", [loose_json, lambda text: parse_json(text, "it", ValueError)])
+def test_json_of_millions_of_values_is_not_parsed(monkeypatch, parse, value):
     """Parsed, a file of 62 MB took 2 GB."""
-    monkeypatch.setattr(json, "loads", lambda _: pytest.fail("parsed"))
+    monkeypatch.setattr(json, "loads", lambda *_, **__: pytest.fail("parsed"))
     with pytest.raises(ValueError, match="more than 4,000,000 values"):
-        loose_json(("[" + 2_100_000 * (value + ",") + "0]").encode())
+        parse(("[" + 2_100_000 * (value + ",") + "0]").encode())
+
+
+def test_toml_that_nobody_wrote_is_not_parsed(monkeypatch):
+    """A list of gestures in a bundle, or beside a model, may be as long as its file."""
+    monkeypatch.setattr(tomllib, "loads", lambda _: pytest.fail("parsed"))
+    with pytest.raises(ValueError, match="more than 1,048,576 characters"):
+        parse_toml("x = [" + "[]," * 350_000 + "]")

@@ -35,7 +35,7 @@ HEAD = HeadSettings(
     initial=Initial(200),
     density=Density(max_gaussians=200),
 )
-FOUND = Examination(30.0, 25.0, (Advice("blur", spans=((2, 3),)),), True)
+FOUND = Examination(30.0, 25.0, 512**2, (Advice("blur", spans=((2, 3),)),), True)
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):
 
 
 def test_a_video_of_which_nothing_can_be_made(tracked, settings, monkeypatch, capfd):
-    worse = Examination(30.0, 25.0, (Advice("face-none", "refused"),), True)
+    worse = Examination(30.0, 25.0, 512**2, (Advice("face-none", "refused"),), True)
     monkeypatch.setattr(room, "examine", lambda *_: worse)
     told = []
     with pytest.raises(CaptureError, match=r"ada\.mp4: no face is found: film one"):

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from safetensors.numpy import load, save
 
 from ico3d.errors import SettingsError
+from ico3d.motion import clip as files
 from ico3d.motion.clip import Clip, Marks, clip_of, from_bytes, from_json, to_bytes, to_json
 from ico3d.motion.curves import TOLERANCE, Curve, angles, packed, reduced, unpacked
 from ico3d.motion.roles import ROLES
@@ -169,3 +170,17 @@ def test_a_file_of_more_gestures_than_anybody_makes_is_refused(clips):
         from_bytes(changed(clips, "wave/head/times", first, many))
     with pytest.raises(SettingsError, match="names of 100 letters"):
         from_bytes(changed(clips, "wave/head/times", first, {"b" * 101: marks}))
+
+
+@pytest.mark.parametrize(
+    ("parser", "content", "why"),
+    [
+        ("parse_json", (1 << 21).to_bytes(8, "little") + b"[" * (1 << 21), "head is larger"),
+        ("bounded_head", bytes(files.MOST_BYTES + 1), "more than 16 MiB"),
+    ],
+)
+def test_nothing_is_made_of_a_file_of_absurd_size(monkeypatch, parser, content, why):
+    """A head of 100 MB in a bundle took 3.7 GB when the bundle was opened."""
+    monkeypatch.setattr(files, parser, lambda *_: pytest.fail("parsed"))
+    with pytest.raises(SettingsError, match=why):
+        from_bytes(content)

@@ -10,6 +10,7 @@ from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
 from ico3d.errors import CaptureError
+from ico3d.rig import body_track
 from ico3d.rig.binding import Binding
 from ico3d.rig.body_track import NAME, BodyTrack, read_body_track, track_file, write_body_track
 from ico3d.rig.quaternions import from_rotvec
@@ -163,4 +164,12 @@ def test_numbers_that_numpy_has_not_are_refused(track, tmp_path, kind):
     head = json.dumps({"__metadata__": about, "joints": joints}).encode()
     file.write_bytes(len(head).to_bytes(8, "little") + head + bytes(joints["data_offsets"][1]))
     with pytest.raises(CaptureError, match="is damaged"):
+        read_body_track(tmp_path, 5, 15.0)
+
+
+def test_a_track_that_says_megabytes_of_itself_is_not_opened(track, tmp_path, monkeypatch):
+    """A head of 16 MB took 634 MB."""
+    damaged(track, tmp_path, source="," * (1 << 20))
+    monkeypatch.setattr(body_track, "safe_open", lambda *_: pytest.fail("opened"))
+    with pytest.raises(CaptureError, match="head is larger"):
         read_body_track(tmp_path, 5, 15.0)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from safetensors import SafetensorError
-from safetensors.numpy import load
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
@@ -16,6 +15,7 @@ from ico3d.common.camera import Camera
 from ico3d.common.files import json_of, read_small
 from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim
+from ico3d.common.unpacking.heads import load_bounded
 from ico3d.errors import CaptureError
 
 FORMAT, VERSION = "ico3d-synthetic", 2
@@ -161,8 +161,8 @@ class SyntheticCapture(RecordedCapture):
     def _read_frames(self) -> dict[str, np.ndarray]:
         file = self.path / "frames.safetensors"
         try:
-            arrays = load(read_small(file, most=LARGEST))
-        except (OSError, SafetensorError) as error:
+            arrays = load_bounded(read_small(file, most=LARGEST))
+        except (OSError, SafetensorError, ValueError) as error:
             raise CaptureError(f"{file} is missing or damaged: record again.") from error
         frames, shapes = self.num_frames, len(self._about["blendshape_names"])
         expected = {

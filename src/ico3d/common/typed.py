@@ -13,7 +13,9 @@ from typing import Annotated, Any, Literal, TypeVar, cast
 
 T = TypeVar("T")
 MOST_VALUES = 4_000_000
-"""Lists, objects and their entries of a text of JSON: parsed, each takes up to 70 bytes."""
+"""Lists, objects and their entries of a text of JSON: parsed, each takes up to 100 bytes."""
+MOST_TOML = 1 << 20
+"""Characters of a text of TOML, which people write."""
 MOST_PARTS = 100
 """Parts of a dotted key of TOML: Python's parser takes minutes for one of tens of thousands."""
 NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
@@ -297,11 +299,13 @@ def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any
         error: Makes the exception to raise from one sentence.
 
     Raises:
-        Exception: `error`, if the data is not strict JSON.
+        Exception: `error`, if the data is not strict JSON, or has more than `MOST_VALUES`.
     """
     try:
+        text = data.decode("utf-8")
+        _check_values(text, MOST_VALUES)
         return json.loads(
-            data.decode("utf-8"),
+            text,
             object_pairs_hook=_unique_keys,
             parse_constant=refuse_constant,
         )
@@ -310,27 +314,37 @@ def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any
         raise error(f"{name}: is not valid JSON ({line}).") from cause
 
 
-def loose_json(data: bytes | str) -> Any:
+def loose_json(data: bytes | str, most: int = MOST_VALUES) -> Any:
     """Parses JSON that may be anybody's, as leniently as Python: NaN may be there, keys repeat.
 
+    Args:
+        data: The text.
+        most: Lists, objects and their entries that it may have.
+
     Raises:
-        ValueError: If it is no JSON in UTF-8, nested too deep, or has more than `MOST_VALUES`.
+        ValueError: If it is no JSON in UTF-8, nested too deep, or has more than `most`.
     """
     text = data if isinstance(data, str) else data.decode("utf-8-sig")
-    if text.count("[") + text.count("{") + text.count(",") > MOST_VALUES:
-        raise ValueError(f"it has more than {MOST_VALUES:,} values")
+    _check_values(text, most)
     try:
         return json.loads(text)
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
 
 
+def _check_values(text: str, most: int) -> None:
+    if text.count("[") + text.count("{") + text.count(",") > most:
+        raise ValueError(f"it has more than {most:,} values")
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """Parses TOML that may be anybody's.
 
     Raises:
-        ValueError: If the text is no TOML, or nested too deep.
+        ValueError: If the text is no TOML, longer than `MOST_TOML`, or nested too deep.
     """
+    if len(text) > MOST_TOML:
+        raise ValueError(f"it has more than {MOST_TOML:,} characters")
     if any(map(_has_many_parts, re.split(r"[=\n]", text))):
         raise ValueError(f"a key has more than {MOST_PARTS} parts")
     try:

@@ -72,7 +72,7 @@ def create(settings: CreateSettings, tell: Tell) -> Made:
         quality = QUALITIES[settings.quality]
         found = _looked(settings, tell)
         voice = clone(settings, place, tell)
-        check_room(place.folder, quality, found.seconds)
+        check_room(place.folder, quality, found.seconds, found.pixels)
         tell(_planned(settings, place, found))
         capture = _tracked(settings, place, found.seconds, tell)
         set_pace(settings.device)  # other programs may have come or gone

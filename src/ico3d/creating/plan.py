@@ -15,8 +15,8 @@ REFINE = 1.5
 """Work of a step that corrects a pose, in the same unit: 20 to 40 ms where the unit is 20."""
 LEARN, COMPARE = 9.2, 2.0
 """Work of a step that learns, and of a picture that is compared, in the same unit, measured."""
-BYTES = 0.28e6
-"""Bytes that a kept picture of 512² pixels takes with all that belongs to it, measured."""
+BYTES = 1.07
+"""Bytes that a pixel of a kept picture takes with all that belongs to it, measured."""
 SPARE = 0.4e9
 """Bytes that are to be free for everything else: checkpoints, previews, the avatar."""
 
@@ -67,14 +67,23 @@ def _tracking(quality: Quality, seconds: float) -> dict[str, float]:
     }
 
 
-def check_room(folder: Path, quality: Quality, seconds: float) -> None:
-    """Refuses to begin what a disk cannot hold of a video of so many seconds.
+def check_room(folder: Path, quality: Quality, seconds: float, pixels: int) -> None:
+    """Refuses to begin what a disk cannot hold of a video.
+
+    Pictures of people are meant; what takes more, such as noise, ends once the disk is nearly full.
+
+    Args:
+        folder: A folder on the disk.
+        quality: How much work goes into it.
+        seconds: Length of the video.
+        pixels: Of each picture, as it is kept.
 
     Raises:
         StorageError: If there is too little room.
     """
     everything = seconds * FPS  # all pictures lie there until some are chosen
-    needed = BYTES * max(everything / 2, pictures_of(quality, seconds)) + SPARE
+    pictures = max(everything / 2, pictures_of(quality, seconds))
+    needed = BYTES * pixels * pictures + SPARE
     free = shutil.disk_usage(folder).free
     if free < needed:
         sizes = {"free": round(free / 1e9, 1), "needed": round(needed / 1e9, 1)}

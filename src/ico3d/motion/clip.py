@@ -11,9 +11,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
 from ico3d.common.typed import parse_json
+from ico3d.common.unpacking.heads import bounded_head, load_bounded
 from ico3d.errors import SettingsError
 from ico3d.motion.curves import TOLERANCE, Curve, packed, reduced, unpacked
 from ico3d.motion.roles import INDEX, ROLES, SIDES, mirrored_role
@@ -24,6 +25,8 @@ VERSION = 1
 """Version of the files."""
 MOST_CLIPS, LONGEST_NAME = 1000, 100
 """Gestures of a file, and letters of a name: each question of a visitor is compared with all."""
+MOST_BYTES = 16 << 20
+"""Bytes of a file; its curves become four times as much."""
 _DAMAGE = (ValueError, KeyError, TypeError, AttributeError, OverflowError)
 """What parts of damaged files raise."""
 
@@ -178,13 +181,23 @@ def from_bytes(content: bytes) -> dict[str, Clip]:
         SettingsError: If the file is damaged or does not hold gestures.
     """
     try:
-        size = int.from_bytes(content[:8], "little")
-        header = cast(dict[str, Any], parse_json(content[8 : 8 + size], "clips", ValueError))
-        arrays = load(content)
-        about = parse_json(header["__metadata__"]["clips"].encode(), "clips", ValueError)
-        return _clips(cast(dict[str, Any], about), arrays)
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"it has more than {MOST_BYTES >> 20} MiB")
+        about = parse_json(texts_of(content)["clips"].encode(), "clips", ValueError)
+        return _clips(cast(dict[str, Any], about), load_bounded(content))
     except (SafetensorError, *_DAMAGE) as error:
         raise SettingsError(f"the file of gestures is damaged ({error}).") from error
+
+
+def texts_of(content: bytes) -> dict[str, str]:
+    """The texts by name in the head of a file of clips.
+
+    Raises:
+        ValueError: If the head is larger than those of gestures, or no JSON.
+        KeyError: If it has no texts.
+    """
+    head = cast(dict[str, Any], parse_json(bounded_head(content), "clips", ValueError))
+    return head["__metadata__"]
 
 
 def _clips(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, Clip]:

@@ -8,7 +8,7 @@ from safetensors.numpy import save
 
 from ico3d.common.typed import parse_json
 from ico3d.errors import SettingsError
-from ico3d.motion.clip import Clip, from_bytes, header_of, meaning, other_hand, tensors_of
+from ico3d.motion.clip import Clip, from_bytes, header_of, meaning, other_hand, tensors_of, texts_of
 from ico3d.motion.figure import NEAR, alike, figure_of
 from ico3d.motion.living import Living, living
 from ico3d.motion.roles import ROLES
@@ -77,18 +77,11 @@ def hung_of(content: bytes) -> Array:
 
 def _figure(content: bytes) -> Any:
     try:
-        return parse_json(_metadata(content, "figure").encode(), "the figure", ValueError)
+        return parse_json(texts_of(content).get("figure", "").encode(), "the figure", ValueError)
     except ValueError as error:
         raise SettingsError("the file of gestures tells no figure.") from error
 
 
 def cuts_text(content: bytes) -> str:
     """The text of cuts in a file of `repertoire_bytes`; empty where it has none."""
-    return _metadata(content, "cuts")
-
-
-def _metadata(content: bytes, name: str) -> str:
-    """A text in the header of a valid safetensors file; empty where there is none."""
-    size = int.from_bytes(content[:8], "little")
-    header = cast(dict[str, Any], json.loads(content[8 : 8 + size]))
-    return header["__metadata__"].get(name, "")
+    return texts_of(content).get("cuts", "")

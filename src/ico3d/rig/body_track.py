@@ -11,7 +11,7 @@ from safetensors.numpy import save
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import parse_json
-from ico3d.common.unpacking.heads import check_head
+from ico3d.common.unpacking.heads import SMALL_HEAD, check_head
 from ico3d.errors import CaptureError
 from ico3d.rig.binding import INFLUENCES, Binding
 from ico3d.rig.quaternions import Array
@@ -177,7 +177,7 @@ def _read(file: Path) -> BodyTrack:
     """
     if file.stat().st_size > MOST_BYTES:
         raise ValueError(f"it has more than {MOST_BYTES >> 20} MiB")
-    check_head(file)
+    check_head(file, SMALL_HEAD)
     with cast(Any, safe_open(file, "numpy")) as content:  # untyped
         text = cast(dict[str, str], content.metadata() or {}).get("body_track", "{}")
         names = cast(list[str], content.keys())

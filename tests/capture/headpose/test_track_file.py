@@ -15,7 +15,7 @@ from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.importing.resizing import resize_capture
 from ico3d.errors import CaptureError
 from support.recordings import multiview_folders
-from support.strangers.claimed import write_claim
+from support.strangers.claimed import write_claim, write_crowded
 
 
 @pytest.fixture
@@ -105,6 +105,12 @@ def test_a_damaged_track_is_one_sentence(folder):
 
 def test_a_track_that_claims_more_than_its_frames_take_is_not_read(folder, monkeypatch):
     write_claim(folder / NAME, "views", 1 << 28)
-    monkeypatch.setattr(track_file, "load", pytest.fail)
+    monkeypatch.setattr(track_file, "load_bounded", pytest.fail)
+    with pytest.raises(CaptureError, match="is damaged: delete it"):
+        read_track(folder, 3, 5)
+
+
+def test_a_track_of_thousands_of_tensors_is_not_read(folder):
+    write_crowded(folder / NAME)
     with pytest.raises(CaptureError, match="is damaged: delete it"):
         read_track(folder, 3, 5)

@@ -1,6 +1,7 @@
 """Moments of which a video has no picture of its own are not read."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from rich.console import Console
 from ico3d.capture.face.mediapipe_face import Face
 from ico3d.capture.portrait import readings
 from ico3d.capture.portrait.readings import MOST_REPEATED, is_repeated, read_faces
+from ico3d.capture.writing import new_folder
+from ico3d.errors import StorageError
 
 
 def _picture(place: float, noise: int = 0) -> np.ndarray:
@@ -81,3 +84,22 @@ def test_repeated_pictures_and_gaps_are_left_out(read, tmp_path):
 def test_who_sits_still_is_seen(read):
     found = read([(_picture(0, noise=n + 1), True) for n in range(9)])
     assert found.frames == list(range(0, 9, MOST_REPEATED + 1))
+
+
+def test_pictures_without_a_face_are_not_kept(read, tmp_path, monkeypatch):
+    """Of an hour of noise behind a second with a face, every picture was."""
+    face = _Reader.read
+    monkeypatch.setattr(
+        _Reader, "read", lambda self, image: face(self, image) if image[50, 10, 0] > 100 else None
+    )
+    found = read([(_picture(place), True) for place in (0, 30, 60, 5)])
+    assert (found.frames, found.missing) == ([0, 3], [1, 2])
+    assert sorted(f.name for f in (tmp_path / "ori_imgs").iterdir()) == ["0.jpg", "3.jpg"]
+
+
+def test_a_disk_is_not_filled(read, tmp_path, monkeypatch):
+    left = iter([new_folder.SPARE + 1, new_folder.SPARE, new_folder.SPARE - 1])
+    monkeypatch.setattr(new_folder.shutil, "disk_usage", lambda _: SimpleNamespace(free=next(left)))
+    with pytest.raises(StorageError, match="the disk is full: free some space"):
+        read([(_picture(place), True) for place in (0, 30, 60, 5)])
+    assert sorted(f.name for f in (tmp_path / "ori_imgs").iterdir()) == ["0.jpg", "1.jpg"]

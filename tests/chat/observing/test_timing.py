@@ -178,6 +178,13 @@ async def test_the_tasks_of_a_loop_are_counted():
     assert figures(monitor)["ico3d_tasks",] == before
 
 
+async def test_a_page_has_heard_nothing_before_it_was_asked_for(watched):
+    await watched.ask(1000)
+    await watched.answer(1460)
+    watched.observer.heard(0, 1e7)  # what no message to a page may hold
+    assert watched.told[1:] == [Metrics("played", {"voice_to_voice": 0.0})]
+
+
 async def test_turns_become_figures_and_lines(watched, tmp_path):
     path = tmp_path / "turns.jsonl"
     path.write_text('{"before": 1}\n')

@@ -150,9 +150,9 @@ def test_a_disk_that_is_full_or_too_small(person, video, tmp_path):
     kept(person, "text-1", video.read_bytes())
     with files_of_at_most(1500):  # the progress, not the parts as one video
         assert _failed(person).code == "disk-full"
-    with pytest.raises(StorageError, match=r"has .* GB left and 3500000\.4 GB are") as told:
-        check_room(tmp_path, QUALITIES["quick"], 1e9)
-    assert told.value.code == "disk-room" and told.value.values["needed"] == 3500000.4
+    with pytest.raises(StorageError, match=r"has .* GB left and 3506176\.4 GB are") as told:
+        check_room(tmp_path, QUALITIES["quick"], 1e9, 512**2)
+    assert told.value.code == "disk-room" and told.value.values["needed"] == 3506176.4
 
 
 def test_a_disk_on_which_not_even_that_can_be_noted(person, video, monkeypatch, tmp_path):

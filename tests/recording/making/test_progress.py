@@ -25,7 +25,7 @@ BLUR = {"code": "blur", "level": "better", "values": {}, "spans": [[2, 3]], "det
 def test_events_become_steps_time_and_pictures(tmp_path):
     clock = [0.0]
     tell = Reporter(tmp_path, Progress("running", "quick"), lambda: clock[0])
-    tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, ADVICE, True)))
+    tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, 512**2, ADVICE, True)))
     tell(Planned({"track": 10.0, "learn": 100.0, "measure": 5.0}, {}))
     found = read_progress(tmp_path)
     assert found is not None
@@ -78,7 +78,7 @@ def test_the_time_left_counts_down_between_reports_to_what_later_steps_need(tmp_
 
 def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
     tell = Reporter(tmp_path, Progress("running", "quick"))
-    tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, ADVICE, True)))
+    tell(Looked(Path("x.mp4"), Examination(30.0, 25.0, 512**2, ADVICE, True)))
     tell(Voiced(30.0))
     assert len(tell.progress.advice) == 1
     lacking = "openvoice is not installed."

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding
 from ico3d.common.expression import EYE_NAMES
 from ico3d.common.files import MOST_NOTES, read_small, write_atomic
+from ico3d.common.unpacking.heads import load_bounded
 from ico3d.errors import CaptureError
 
 NAME = "tracking.safetensors"
@@ -127,7 +128,7 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
     }
     most = MOST_NOTES + 8 * sum(map(math.prod, shapes.values()))
     try:
-        arrays = load(read_small(file, most=most))
+        arrays = load_bounded(read_small(file, most=most))
     except (OSError, SafetensorError, ValueError, KeyError) as error:
         raise CaptureError(f"{file} is damaged: {mend}.") from error
     for name, shape in shapes.items():

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from ico3d.capture.decoding import open_picture
+from ico3d.capture.writing.new_folder import check_left
 from ico3d.common.files import read_small
 from ico3d.errors import CaptureError
 
@@ -19,8 +20,13 @@ OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def save_picture(path: Path, image: np.ndarray) -> None:
-    """Writes uint8 RGB(A) or grey; JPEGs without chroma subsampling."""
+    """Writes uint8 RGB(A) or grey; JPEGs without chroma subsampling.
+
+    Raises:
+        StorageError: If the disk is nearly full.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
+    check_left(path.parent)
     picture = Image.fromarray(image)
     if path.suffix == ".jpg":
         picture.save(path, quality=97, subsampling=0)

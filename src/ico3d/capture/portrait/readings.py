@@ -55,13 +55,14 @@ class Readings:
 def read_faces(
     work: Path, video: Video, model: Path, console: Console, reached: Reached | None
 ) -> Readings:
-    """Writes every picture and reads the face in it.
+    """Reads the face in every picture, and writes those that show one.
 
     A moment of which the video has no picture of its own, because the camera was slow or the
     picture before was recorded again, is left out: face and sound would not belong together.
 
     Raises:
         CaptureError: If there is no face in any of them.
+        StorageError: If the disk is nearly full.
     """
     readings = Readings()
     total = round(video.announced / video.rate * FPS) if video.announced * video.rate else None
@@ -76,12 +77,12 @@ def read_faces(
                 readings.repeated.append(number)
                 continue
             in_a_row = 0
-            save_picture(work / "ori_imgs" / f"{number}.jpg", image)
             face = reader.read(image)
             if face is None:
                 readings.missing.append(number)
                 continue
             before = image
+            save_picture(work / "ori_imgs" / f"{number}.jpg", image)
             readings.frames.append(number)
             readings.landmarks.append(face.landmarks)
             readings.blendshapes.append(face.blendshapes)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import NOT_STATED
-from ico3d.errors import CaptureError
+from ico3d.errors import CaptureError, StorageError
 
 SPARE = 1 << 28
 """Bytes of a disk that a folder of a recording leaves free."""
@@ -74,6 +74,21 @@ def check_room(folder: Path, size: int) -> None:
         raise CaptureError(
             f"{size / 1e9:.1f} GB are to be written to {folder.parent}, which has "
             f"{free / 1e9:.1f} GB left: make room, or name another folder."
+        )
+
+
+def check_left(folder: Path) -> None:
+    """Checks that a disk has not become full while a folder of a recording is written.
+
+    How much a video becomes is not known before it is read: pictures of noise take ten times as
+    much as those of people.
+
+    Raises:
+        StorageError: If less than `SPARE` is left.
+    """
+    if shutil.disk_usage(folder).free < SPARE:
+        raise StorageError.of(
+            "disk-full", f"{folder.parent} cannot be written, as ", " Run the same command again."
         )
 
 

@@ -136,7 +136,8 @@ class TurnObserver(BaseObserver):
         """Registers that the page has played `position` seconds of an utterance."""
         turn = self._turn
         if turn and turn.utterance == utterance and turn.heard is None and position > 0:
-            turn.heard = self._now() - position
+            # a page may claim any position, but nothing is heard before it is asked for
+            turn.heard = max(self._now() - position, turn.asked)
             self._report(Metrics("played", {"voice_to_voice": 1000 * (turn.heard - turn.asked)}))
 
     def _look(self, frame: Frame, at: float) -> None:

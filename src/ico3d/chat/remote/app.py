@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 
 from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pipecat.processors.frame_processor import FrameProcessor
 from starlette.exceptions import HTTPException
@@ -73,11 +72,6 @@ def _bare_app(kind: str, name: str) -> FastAPI:
     async def models() -> JSONResponse:
         model = {"id": name, "object": "model", "created": started, "owned_by": "ico3d"}
         return JSONResponse({"object": "list", "data": [model]})
-
-    @app.exception_handler(RequestValidationError)
-    async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
-        first = error.errors()[0]
-        return error_response(400, f"{'.'.join(map(str, first['loc']))}: {first['msg']}.")
 
     @app.exception_handler(HTTPException)
     async def refused(_: Request, error: HTTPException) -> JSONResponse:

@@ -4,10 +4,10 @@ import asyncio
 import io
 import wave
 from collections.abc import Iterator
-from typing import Annotated, BinaryIO, Literal
+from typing import BinaryIO
 
 import numpy as np
-from fastapi import FastAPI, File, Form, Response, UploadFile
+from fastapi import FastAPI, Request, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
 from pipecat.frames.frames import (
     Frame,
@@ -16,7 +16,9 @@ from pipecat.frames.frames import (
     VADUserStartedSpeakingFrame,
     VADUserStoppedSpeakingFrame,
 )
+from starlette.datastructures import UploadFile
 
+from ico3d.chat.remote.asked import form_of
 from ico3d.chat.remote.headless import Spares, run
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, MICROPHONE_RATE
 from ico3d.common.sound import REQUEST, WAV_ERRORS, fault, open_claim
@@ -26,6 +28,7 @@ from ico3d.speech.mel import resampling_stream
 LEAD_IN = 15  # chunks before speech is announced: a VAD is that late too
 QUIET = np.zeros(MICROPHONE_RATE * 3 // 10, np.int16)  # around speech, as recognisers expect it
 BLOCK = 1 << 14  # frames that are converted at once
+FORMATS = ("json", "text", "verbose_json")
 DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a WAV's samples
 
 
@@ -40,14 +43,17 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
     """
 
     @app.post("/v1/audio/transcriptions")
-    async def transcriptions(
-        file: Annotated[UploadFile, File()],
-        response_format: Annotated[Literal["json", "text", "verbose_json"], Form()] = "json",
-    ) -> Response:
-        pcm = await asyncio.to_thread(read_wav, file.file)
+    async def transcriptions(sent: Request) -> Response:
+        async with form_of(sent) as form:
+            file, response_format = form.get("file"), form.get("response_format", "json")
+            if not isinstance(file, UploadFile):
+                raise ProtocolError("file: a file is required.")
+            if response_format not in FORMATS:
+                raise ProtocolError(f"response_format: must be one of {', '.join(FORMATS)}.")
+            pcm = await asyncio.to_thread(read_wav, file.file)
         made = run(await spares.take(), heard(pcm), seconds)
         said = [frame async for frame in made if isinstance(frame, TranscriptionFrame)]
-        return _answer(said, len(pcm) / MICROPHONE_RATE, response_format)
+        return _answer(said, len(pcm) / MICROPHONE_RATE, str(response_format))
 
 
 def _answer(said: list[TranscriptionFrame], duration: float, form: str) -> Response:

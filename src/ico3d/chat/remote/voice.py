@@ -5,7 +5,7 @@ import struct
 from collections.abc import AsyncGenerator
 from typing import Literal
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.responses import StreamingResponse
 from pipecat.frames.frames import (
     Frame,
@@ -17,6 +17,7 @@ from pipecat.frames.frames import (
 from pipecat.services.tts_service import TTSService
 from pydantic import BaseModel, Field
 
+from ico3d.chat.remote.asked import asked
 from ico3d.chat.remote.headless import Spares, run
 from ico3d.chat.services.voice.lasting import bound_sound
 from ico3d.chat.wire.protocol import SPEECH_RATE
@@ -50,7 +51,8 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
     """
 
     @app.post("/v1/audio/speech")
-    async def speech(request: SpeechRequest) -> StreamingResponse:
+    async def speech(sent: Request) -> StreamingResponse:
+        request = await asked(sent, SpeechRequest)
         sound = spoken(request.input, spares, seconds)
         first = await anext(sound)  # an error is still an answer here
         is_wav = request.response_format == "wav"

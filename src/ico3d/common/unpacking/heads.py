@@ -2,19 +2,55 @@
 
 from pathlib import Path
 
+import numpy as np
+from safetensors.numpy import load
+
 MOST_HEAD, MOST_TENSORS = 16 << 20, 10_000
 """Bytes of what a file says of its tensors and of itself, and how many tensors it may have: for
 each of them more than a kilobyte of memory is taken, whatever it holds."""
+SMALL_HEAD = 1 << 20
+"""Bytes of a head that is parsed here: what it says becomes thirty times as much."""
 
 
-def check_head(path: Path) -> None:
+def check_head(path: Path, most: int = MOST_HEAD) -> None:
     """Refuses a file whose head takes much memory, before it is opened.
+
+    Args:
+        path: The file.
+        most: Bytes that its head may have.
 
     Raises:
         OSError: If the file cannot be read.
-        ValueError: If the head is longer than `MOST_HEAD`, or names more than `MOST_TENSORS`.
+        ValueError: If the head is longer, or names more than `MOST_TENSORS`.
     """
     with path.open("rb") as file:
         size = int.from_bytes(file.read(8), "little")
-        if size > MOST_HEAD or file.read(size).count(b'"dtype"') > MOST_TENSORS:
-            raise ValueError("its head is larger than those of models")
+        _check(size, file.read(min(size, most)), most)
+
+
+def bounded_head(content: bytes, most: int = SMALL_HEAD) -> bytes:
+    """The head of a file's content, which is JSON.
+
+    Raises:
+        ValueError: If it is longer than `most`, or names more than `MOST_TENSORS`.
+    """
+    size = int.from_bytes(content[:8], "little")
+    head = content[8 : 8 + min(size, most)]
+    _check(size, head, most)
+    return head
+
+
+def load_bounded(content: bytes) -> dict[str, np.ndarray]:
+    """The tensors of a file's content by name.
+
+    Raises:
+        SafetensorError: If the file is damaged.
+        ValueError: If its head is longer than `MOST_HEAD`, or names more than `MOST_TENSORS`.
+    """
+    bounded_head(content, MOST_HEAD)
+    return load(content)
+
+
+def _check(size: int, head: bytes, most: int) -> None:
+    if size > most or head.count(b'"dtype"') > MOST_TENSORS:
+        raise ValueError("its head is larger than those of models")

@@ -33,12 +33,14 @@ class Examination:
     Attributes:
         seconds: Length of the video.
         rate: Pictures per second.
+        pixels: Of each picture, scaled down as an avatar is made of it.
         advice: What would make it better, what stands in the way of an avatar first.
         hands_sought: Whether hands before the face were looked for.
     """
 
     seconds: float
     rate: float
+    pixels: int
     advice: tuple[Advice, ...]
     hands_sought: bool
 
@@ -73,7 +75,8 @@ def examine(path: Path, size: int, reached: Callable[[float], None]) -> Examinat
         *sound_advice(read_sound(path)),
     ]
     found.sort(key=lambda one: one.level != "refused")
-    return Examination(seconds, _rate(video), tuple(found), samples.hands_sought)
+    pixels = video.width * video.height
+    return Examination(seconds, _rate(video), pixels, tuple(found), samples.hands_sought)
 
 
 def refuse_photograph(path: Path) -> None:

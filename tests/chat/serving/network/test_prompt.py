@@ -2,16 +2,20 @@
 
 import asyncio
 import contextlib
+import re
 import time
+from pathlib import Path
 
 import pytest
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse
 from websockets.server import ServerProtocol
 
+import ico3d
 from ico3d.chat.serving.network import prompt
 from support.chat.serving import running, serving
 
+SOURCES = Path(ico3d.__file__).parent
 REQUEST = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n"
 HOST = b" HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 UPGRADE = (
@@ -162,6 +166,7 @@ async def test_a_request_has_so_many_headers_and_no_more(port, more, answered):
 
 LISTS = [
     b"Accept-Encoding: " + b"a;q=1," * 600,
+    b"Accept-Language: " + b"a-b;q=1," * 400,
     b"Connection: " + b"a," * 1500,
     b"If-None-Match: " + b'"a",' * 700,
     b"Range: bytes=" + b"1-2," * 700,
@@ -175,6 +180,16 @@ async def test_what_somebody_reads_word_by_word_is_short(port, lists):
         writer.write(REQUEST % port + lists + b"\r\n\r\n")
         with contextlib.suppress(ConnectionResetError):
             assert await reader.read() == b""
+
+
+def test_whatever_the_servers_read_of_a_head_counts():
+    """`Authorization` is compared as a whole."""
+    read = re.compile(r"headers\.get(?:list)?\(\"([\w-]+)\"")
+    rooms = (SOURCES / room for room in ("chat/remote", "chat/serving", "recording"))
+    files = (file.read_text("utf-8") for room in rooms for file in room.rglob("*.py"))
+    names = {name.lower() for text in files for name in read.findall(text)}
+    assert {"accept-language", "origin"} < names
+    assert {name.encode() for name in names - {"authorization"}} <= prompt.PARSED
 
 
 async def test_a_long_header_that_nobody_reads_is_borne(port):

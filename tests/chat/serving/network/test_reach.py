@@ -2,13 +2,19 @@
 
 import ipaddress
 import socket
+from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 
 import psutil
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from ico3d.chat.serving.guard import is_own
-from ico3d.chat.serving.network import addresses, reach
+from ico3d.chat.serving.network import addresses, certificates, reach
+from ico3d.chat.serving.network.certificates import given_certificate
 from ico3d.chat.serving.network.reach import Reach, checked_name, find_reach, machine_names, qr_code
 from ico3d.errors import SettingsError
 
@@ -93,6 +99,23 @@ def test_the_operator_is_told_who_can_reach_the_server():
 def test_a_key_does_not_travel_unencrypted():
     with pytest.raises(SettingsError, match=r"--tls, or --proxy ADDRESS .* or --open"):
         find_reach("0.0.0.0", [], False, None, None)
+
+
+def test_a_key_that_holds_up_everybody_is_told(tmp_path, monkeypatch):
+    key = rsa.generate_private_key(65537, 2048)
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "avatar.example.org")])
+    now = datetime.now(UTC)
+    made = x509.CertificateBuilder(name, name, key.public_key(), 1, now, now + timedelta(days=1))
+    file = tmp_path / "both.pem"
+    file.write_bytes(
+        made.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM)
+        + key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    )
+    for bits, told in ((2048, False), (2047, True)):
+        monkeypatch.setattr(certificates, "LONGEST_RSA", bits)
+        certificate = given_certificate(file, file, now)
+        reach = Reach("0.0.0.0", (), (), certificate)
+        assert any("holds up everybody" in line for line in reach.told(8765, "")) is told
 
 
 @pytest.mark.parametrize("proxy", ["proxy.example", "*", "", "0.0.0.0/0", "::/0", "10.0.0.1/8"])

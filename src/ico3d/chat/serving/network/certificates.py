@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
-from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
@@ -21,6 +21,10 @@ VALID = timedelta(days=397)  # browsers accept no public certificate for longer
 RENEWED = timedelta(days=14)  # before its end
 SKEW = timedelta(days=1)  # by which another machine's clock may be behind
 NAME = "server.pem"
+
+
+LONGEST_RSA = 4096
+"""Bits of a key that signs within two milliseconds; one of twice as many takes over twenty."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class Certificate:
         names: Host names for which it is valid, in lower case.
         own: Whether this machine has made it, so that browsers ask their users about it.
         fingerprint: SHA-256 hash of the certificate, in hexadecimal, as browsers show it.
+        slow: Whether its key is so long that handshakes hold up everybody.
     """
 
     file: Path
@@ -40,6 +45,7 @@ class Certificate:
     names: tuple[str, ...]
     own: bool
     fingerprint: str
+    slow: bool
 
 
 def state_folder() -> Path:
@@ -129,7 +135,9 @@ def hosts_of(certificate: x509.Certificate) -> list[str]:
 def _described(certificate: x509.Certificate, file: Path, key: Path, own: bool) -> Certificate:
     names = tuple(host for host in hosts_of(certificate) if _address(host) is None)
     fingerprint = certificate.fingerprint(hashes.SHA256()).hex(":").upper()
-    return Certificate(file, key, names, own, fingerprint)
+    public = certificate.public_key()
+    slow = isinstance(public, rsa.RSAPublicKey) and public.key_size > LONGEST_RSA
+    return Certificate(file, key, names, own, fingerprint, slow)
 
 
 def _read_own(file: Path) -> x509.Certificate | None:

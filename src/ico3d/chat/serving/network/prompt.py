@@ -29,7 +29,7 @@ UNREAD = (b"cookie", b"sec-websocket-protocol", b"sec-websocket-extensions")
 older Python takes the square of a quoted value's length (CVE-2024-7592), and lists of WebSockets,
 read word by word."""
 PARSED = frozenset(
-    b"accept accept-encoding connection content-length content-type expect host "
+    b"accept accept-encoding accept-language connection content-length content-type expect host "
     b"if-modified-since if-none-match if-range origin range te trailer transfer-encoding upgrade "
     b"x-forwarded-for x-forwarded-proto".split()
 )

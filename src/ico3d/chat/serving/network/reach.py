@@ -80,6 +80,11 @@ class Reach:
                 "All of them seem to come from this machine, so limits per address do not hold: "
                 "--proxy 127.0.0.1 believes what a proxy here says of where they come from."
             )
+        if self.certificate is not None and self.certificate.slow:
+            lines.append(
+                "The certificate's key is so long that each handshake holds up everybody for tens "
+                "of milliseconds: a key on the curve P-256, or of RSA with 2048 bits, does not."
+            )
         if self.certificate is not None and self.certificate.own:
             lines += [
                 "This machine has made the certificate itself, so each browser asks once whether "
