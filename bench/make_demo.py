@@ -98,7 +98,7 @@ BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=10)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5500 "
-    "--density.gradient 0.00018 --density.min-contribution 0.15"
+    "--density.gradient 0.00018 --density.min-contribution 0.15 --displacements 8"
 )
 TRAIN_BODY = (
     "--steps-per-frame 100 --initial.gaussians 60000 --initial.opacity 0.8 "

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ico3d.bundle.evaluate import attributes, centres, coefficients, logits
+from ico3d.bundle.evaluate import attributes, centres, coefficients, logits, steps
 from support.bundles.random_bundle import random_head
 
 
@@ -31,13 +31,17 @@ def test_it_is_the_documented_formula():
 
 def test_centres_are_the_documented_formula():
     head, e = random_head(5), np.linspace(-1, 1, 39)
-    rows = head.displacement_map.astype(np.float64)
-    steps = [sum(e[b] * rows[b, m] for b in range(39)) + rows[39, m] for m in range(2)]
+    w1, b1 = head.displacement_w1.astype(np.float64), head.displacement_b1
+    hidden = [sum(e[b] * w1[b, g] for b in range(39)) + b1[g] for g in range(64)]
+    hidden = [x if x > 0 else 0.02 * x for x in hidden]
+    w2, b2 = head.displacement_w2.astype(np.float64), head.displacement_b2
+    metres = [sum(hidden[g] * w2[g, m] for g in range(64)) + b2[m] for m in range(2)]
+    np.testing.assert_allclose(steps(head, e), metres, rtol=1e-4)
     moved = centres(head, e)
     assert np.abs(moved - head.means).max() > 1e-3
     for n in range(5):
         for axis in range(3):
-            by = sum(steps[m] * int(head.displacement_basis[m, n, axis]) for m in range(2))
+            by = sum(metres[m] * int(head.displacement_basis[m, n, axis]) for m in range(2))
             np.testing.assert_allclose(moved[n, axis], head.means[n, axis] + by, atol=1e-6)
 
 

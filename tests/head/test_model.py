@@ -92,14 +92,17 @@ def _moving(dtype=torch.float64) -> HeadModel:
     shape = head_shape(3, features=8, hidden=6, frequencies=2, turns=True, displacements=2)
     model = HeadModel(shape, 5).to(dtype)
     model.displacement_basis.data = torch.randn(2, 5, 3, dtype=dtype)
-    model.displacement_map.copy_(torch.randn(4, 2))
+    for layer in model.move_network:
+        layer.copy_(torch.randn(layer.shape))
     return model
 
 
-def test_centres_move_linearly_with_the_expression_and_not_with_the_heads_rotation():
+def test_centres_move_with_the_expression_and_not_with_the_heads_rotation():
     model, e = _moving(), torch.tensor([0.2, -0.5, 0.7], dtype=torch.float64)
-    rows = model.displacement_map
-    c = [sum(float(e[b] * rows[b, m]) for b in range(3)) + float(rows[3, m]) for m in range(2)]
+    w1, b1, w2, b2 = model.move_network
+    hidden = [float(sum(e[b] * w1[b, g] for b in range(3)) + b1[g]) for g in range(64)]
+    hidden = [x if x > 0 else 0.02 * x for x in hidden]
+    c = [float(sum(hidden[g] * w2[g, m] for g in range(64)) + b2[m]) for m in range(2)]
     expected = model.means + c[0] * model.displacement_basis[0] + c[1] * model.displacement_basis[1]
     torch.testing.assert_close(model(e).means, expected)
     turned = torch.cat([e, torch.ones(3, dtype=torch.float64)])

@@ -18,6 +18,9 @@ export const SPZ = {"ratio": 8, "free": 262144, "degree": 3} as const;
 /** What else a bundle may have: a head's counts, a body's frames, bytes of a file. */
 export const MOST = {"rank": 64, "displacements": 16, "hidden": 1024, "expression_size": 512, "num_poses": 100000, "window_frames": 1000, "posed_frames": 30000, "file_bytes": 268435456} as const;
 
+/** Width of the network of a head's displacements. */
+export const MOVE_HIDDEN = 64;
+
 /** Residual shapes of a body on a skeleton. */
 export const MAX_SHAPES = 8;
 
@@ -39,7 +42,7 @@ export const MAX_NOTES = 16;
 /** Characters of each. */
 export const MAX_NOTE = 200;
 
-/** Of a head's coefficients; bundle/evaluate.py. */
+/** Of a head's networks; common/expression.py. */
 export const LEAKY_SLOPE = 0.02;
 
 /** The eyelids among blendshapes. */

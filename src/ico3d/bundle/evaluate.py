@@ -3,8 +3,7 @@
 import numpy as np
 
 from ico3d.bundle.head import BakedHead
-
-LEAKY_SLOPE = 0.02
+from ico3d.common.expression import LEAKY_SLOPE
 
 
 def coefficients(head: BakedHead, expression: np.ndarray) -> np.ndarray:
@@ -17,9 +16,29 @@ def coefficients(head: BakedHead, expression: np.ndarray) -> np.ndarray:
     Returns:
         (K,) or (T, K) float32.
     """
-    hidden = np.asarray(expression, np.float32) @ head.w1 + head.b1  # (..., H)
+    return _network(expression, head.w1, head.b1, head.w2, head.b2)
+
+
+def steps(head: BakedHead, expression: np.ndarray) -> np.ndarray:
+    """Metres per unit of each displacement: d(e), by a network as that of `coefficients`.
+
+    Args:
+        head: The baked head.
+        expression: (B,) or (T, B) expressions e.
+
+    Returns:
+        (M,) or (T, M) float32.
+    """
+    parts = (head.displacement_w1, head.displacement_b1, head.displacement_w2, head.displacement_b2)
+    return _network(expression, *parts)
+
+
+def _network(
+    expression: np.ndarray, w1: np.ndarray, b1: np.ndarray, w2: np.ndarray, b2: np.ndarray
+) -> np.ndarray:
+    hidden = np.asarray(expression, np.float32) @ w1 + b1  # (..., H)
     hidden = np.where(hidden > 0, hidden, np.float32(LEAKY_SLOPE) * hidden)
-    return hidden @ head.w2 + head.b2  # (..., K)
+    return hidden @ w2 + b2
 
 
 def logits(head: BakedHead, expression: np.ndarray) -> np.ndarray:
@@ -30,9 +49,8 @@ def logits(head: BakedHead, expression: np.ndarray) -> np.ndarray:
 
 def centres(head: BakedHead, expression: np.ndarray) -> np.ndarray:
     """Centres (N, 3) float32 for an expression (B,): means + Σ_m d_m(e) · displacement_basis[m]."""
-    rows = head.displacement_map
-    steps = np.asarray(expression, np.float32) @ rows[:-1] + rows[-1]  # (M,)
-    return head.means + np.tensordot(steps, head.displacement_basis.astype(np.float32), 1)
+    moved = np.tensordot(steps(head, expression), head.displacement_basis.astype(np.float32), 1)
+    return head.means + moved  # (N, 3)
 
 
 def attributes(head: BakedHead, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ from ico3d.bundle.tensors import (
     join_tensors,
     split_tensors,
 )
+from ico3d.common.expression import MOVE_HIDDEN
 from ico3d.errors import BundleError
 
 HEAD = "head.safetensors"
@@ -49,8 +50,11 @@ class BakedHead:
         basis: (K, N, 4) int8 basis vectors of the logits.
         basis_scale: (N,) float32 logits per unit of `basis`.
         displacement_basis: (M, N, 3) int8 displacements of the centres.
-        displacement_map: (B + 1, M) float32, from an expression and a 1 to metres per unit of
-            `displacement_basis`.
+        displacement_w1: (B, G) float32, first layer of the network from an expression to metres per
+            unit of `displacement_basis`; G is `MOVE_HIDDEN`.
+        displacement_b1: (G,) float32, first layer's bias.
+        displacement_w2: (G, M) float32, second layer.
+        displacement_b2: (M,) float32, second layer's bias.
         w1: (B, H) float32, first layer of the coefficient network.
         b1: (H,) float32, first layer's bias.
         w2: (H, K) float32, second layer.
@@ -64,7 +68,10 @@ class BakedHead:
     basis: np.ndarray
     basis_scale: np.ndarray
     displacement_basis: np.ndarray
-    displacement_map: np.ndarray
+    displacement_w1: np.ndarray
+    displacement_b1: np.ndarray
+    displacement_w2: np.ndarray
+    displacement_b2: np.ndarray
     w1: np.ndarray
     b1: np.ndarray
     w2: np.ndarray
@@ -203,7 +210,10 @@ def no_displacements(num_gaussians: int, expression_size: int) -> dict[str, np.n
     """The displacements of a head whose N Gaussians stand still, for B values of an expression."""
     return {
         "displacement_basis": np.zeros((0, num_gaussians, 3), np.int8),
-        "displacement_map": np.zeros((expression_size + 1, 0), np.float32),
+        "displacement_w1": np.zeros((expression_size, MOVE_HIDDEN), np.float32),
+        "displacement_b1": np.zeros(MOVE_HIDDEN, np.float32),
+        "displacement_w2": np.zeros((MOVE_HIDDEN, 0), np.float32),
+        "displacement_b2": np.zeros(0, np.float32),
     }
 
 
@@ -231,8 +241,14 @@ def poses_from_bytes(data: bytes, num_poses: int) -> np.ndarray:
 
 
 def _head_spec(n: int, k: int, h: int, b: int, m: int) -> Spec:
-    moving = {"displacement_basis": ("I8", (m, n, 3)), "displacement_map": ("F32", (b + 1, m))}
-    return (moving if m else {}) | {
+    moving: Spec = {
+        "displacement_basis": ("I8", (m, n, 3)),
+        "displacement_w1": ("F32", (b, MOVE_HIDDEN)),
+        "displacement_b1": ("F32", (MOVE_HIDDEN,)),
+        "displacement_w2": ("F32", (MOVE_HIDDEN, m)),
+        "displacement_b2": ("F32", (m,)),
+    }
+    return (dict(moving) if m else {}) | {
         "means": ("F32", (n, 3)),
         "quats": ("F16", (n, 4)),
         "scales": ("F16", (n, 3)),
@@ -264,8 +280,9 @@ def _check_values(head: BakedHead) -> None:
         raise BundleError(f"{HEAD}: 'means' reaches farther than {_MAX_LENGTH:g} m.")
     if head.scales.max() > _MAX_LOG_SCALE:
         raise BundleError(f"{HEAD}: 'scales' exceeds exp({_MAX_LOG_SCALE:g}) m.")
-    if (np.abs(head.displacement_map) > _MAX_STEP).any():
-        raise BundleError(f"{HEAD}: 'displacement_map' has steps of more than {_MAX_STEP:g} m.")
+    for name in ("displacement_w2", "displacement_b2"):
+        if (np.abs(getattr(head, name)) > _MAX_STEP).any():
+            raise BundleError(f"{HEAD}: '{name}' has steps of more than {_MAX_STEP:g} m.")
     norms = np.linalg.norm(head.quats.astype(np.float32), axis=1)
     if np.abs(norms - 1).max() > 1e-2:
         raise BundleError(f"{HEAD}: 'quats' are not normalised.")

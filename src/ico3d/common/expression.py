@@ -24,6 +24,12 @@ TURN_SIZE = 3
 MOST_DISPLACEMENTS = 16
 """Largest number of ways in which a head's Gaussians move with its expression."""
 
+MOVE_HIDDEN = 64
+"""Width of the network from an expression to how far a head's Gaussians move."""
+
+LEAKY_SLOPE = 0.02
+"""Slope below 0 of the hidden units of networks that a baked head has."""
+
 LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
 """Indices of the eyelids in `EYE_NAMES`."""
 

@@ -9,7 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from ico3d.common.expression import MOST_DISPLACEMENTS, TURN_SIZE
+from ico3d.common.expression import LEAKY_SLOPE, MOST_DISPLACEMENTS, MOVE_HIDDEN, TURN_SIZE
 from ico3d.errors import ModelError, SettingsError
 from ico3d.head.blending import decoder
 from ico3d.head.blending.basis import blend
@@ -28,6 +28,7 @@ from ico3d.training.checkpoint import (
 Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
 INITIAL_OPACITY = 0.1
+MOVE_NETWORK = ("move_w1", "move_b1", "move_w2", "move_b2")
 MOST = 8192
 """Largest size of an expression, of the MLP and of what it reads."""
 
@@ -137,7 +138,8 @@ class HeadModel(nn.Module):
             where the shape is `relit`.
         displacement_basis: (M, N, 3) metres by which Gaussians move where a coefficient is 1; only
             where the shape has `displacements`.
-        displacement_map: (B + 1, M) from an expression and a 1 to coefficients; not trained.
+        move_w1, move_b1, move_w2, move_b2: (B, G), (G,), (G, M), (M,) layers of the network from an
+            expression to coefficients of the displacements; fitted once the head is trained.
     """
 
     def __init__(self, shape: HeadShape, num_gaussians: int):
@@ -154,9 +156,11 @@ class HeadModel(nn.Module):
         if shape.relit:
             self.light = nn.Parameter(torch.zeros(count, 3))
         if shape.displacements:
-            moved, rows = shape.displacements, shape.expression_size + 1
+            moved, size = shape.displacements, shape.expression_size
             self.displacement_basis = nn.Parameter(torch.zeros(moved, count, 3))
-            self.register_buffer("displacement_map", torch.zeros(rows, moved))
+            layers = (size, MOVE_HIDDEN), (MOVE_HIDDEN,), (MOVE_HIDDEN, moved), (moved,)
+            for name, sizes in zip(MOVE_NETWORK, layers, strict=True):
+                self.register_buffer(name, torch.zeros(sizes))
         bias = math.log(INITIAL_OPACITY / (1 - INITIAL_OPACITY))
         if shape.has_mlp:
             self.trunk = nn.Linear(shape.mlp_inputs, shape.hidden)
@@ -287,8 +291,14 @@ class HeadModel(nn.Module):
         """
         if not self.shape.displacements:
             return expression.new_zeros(0)
-        mapping: Tensor = self.displacement_map  # type: ignore[assignment]
-        return expression[: self.shape.expression_size].to(mapping) @ mapping[:-1] + mapping[-1]
+        w1, b1, w2, b2 = self.move_network
+        hidden = expression[: self.shape.expression_size].to(w1) @ w1 + b1  # (G,)
+        return nn.functional.leaky_relu(hidden, LEAKY_SLOPE) @ w2 + b2
+
+    @property
+    def move_network(self) -> list[Tensor]:
+        """The layers of the network that `moves` evaluates."""
+        return [getattr(self, name) for name in MOVE_NETWORK]
 
     def displaced(self, moves: Tensor) -> Tensor:
         """Centres (N, 3) in metres for coefficients (M,) of the displacements."""

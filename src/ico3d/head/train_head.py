@@ -189,13 +189,18 @@ def seen_moves(
     return {frame: row for frame, row, here in zip(frames, rows, known, strict=True) if here}
 
 
-@torch.no_grad()
 def tell_moves(model: HeadModel, track: ExpressionTrack, moves: Mapping[int, torch.Tensor]) -> None:
     """Fits what expressions tell of a head's displacements to coefficients (M,) by frame."""
     if moves:
-        expressions = torch.stack([track.at(frame) for frame in moves]).numpy()  # (F, B)
-        rows = told(expressions, torch.stack(list(moves.values())).numpy())  # (B + 1, M)
-        model.displacement_map.copy_(torch.from_numpy(rows))  # type: ignore[operator]
+        with torch.no_grad():
+            expressions = torch.stack([track.at(frame) for frame in moves]).numpy()  # (F, B)
+        basis = model.displacement_basis.detach()
+        sizes = basis.norm(dim=2).square().mean(1).sqrt().clamp_min(1e-6).cpu().numpy()  # (M,)
+        coefficients = torch.stack(list(moves.values())).numpy()  # (F, M)
+        network = told(expressions, coefficients, sizes)
+        parts = (network.w1, network.b1, network.w2, network.b2)
+        for buffer, part in zip(model.move_network, parts, strict=True):
+            buffer.copy_(torch.from_numpy(part))
 
 
 def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ico3d.avatar.baking.distil import augmented, distil
 from ico3d.avatar.baking.lowrank import factorise
 from ico3d.avatar.baking.quantise import quantise
+from ico3d.head.blending.distil import augmented, distil
 
 
 @pytest.fixture

@@ -41,27 +41,29 @@ def test_the_strongest_come_first_and_no_more_than_wanted():
     np.testing.assert_allclose(one.modes[0], whole.modes[0])
 
 
+def _guess(network, expressions):
+    hidden = expressions @ network.w1 + network.b1
+    return np.where(hidden > 0, hidden, 0.02 * hidden) @ network.w2 + network.b2
+
+
 def test_expressions_tell_the_coefficients_of_what_they_move():
     expressions, motion = _recording()
     values = principal(LANDMARKS, motion, 2).coefficients(motion)
-    rows = told(expressions, values)
-    assert rows.shape == (5, 2)
-    guess = expressions @ rows[:-1] + rows[-1]
-    np.testing.assert_allclose(guess, values, atol=0.05)  # the regression is damped
-    deaf = told(expressions[::-1][:, 2:], values)
-    assert np.abs(expressions[:, 2:] @ deaf[:-1] + deaf[-1]).max() < 0.5
+    network = told(expressions, values, np.array([3.0, 1.0]))
+    assert network.w1.shape == (4, 64) and network.w2.shape == (64, 2)
+    errors = _guess(network, expressions) - values
+    assert np.sqrt(np.square(errors).mean()) < 0.25  # of 1: each value has noise of .3
+    deaf = told(expressions[::-1], values, np.ones(2))  # of other frames
+    assert np.sqrt(np.square(_guess(deaf, expressions) - values).mean()) > 0.8
 
 
 def test_frames_without_landmarks_do_not_count():
-    expressions, motion = _recording()
+    motion = _recording()[1]
     known = principal(LANDMARKS, motion[::2], 2)
-    rows = told(expressions[::2], known.coefficients(motion[::2]))
     motion[1::2] = np.nan
     found = principal(LANDMARKS, motion, 2)
     np.testing.assert_allclose(found.modes, known.modes)
-    values = found.coefficients(motion)
-    assert np.isnan(values[1::2]).all()
-    np.testing.assert_array_equal(told(expressions, values), rows)
+    assert np.isnan(found.coefficients(motion)[1::2]).all()
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,7 @@ def _score(head: TrainedHead, capture) -> float:
 def test_skin_that_moves_is_learnt_better_by_a_head_that_moves(tmp_path):
     capture = Falling(tmp_path / "falling")
     moving, still = (train_head(capture, tmp_path / str(n), _job(n)) for n in (4, 0))
-    assert _score(moving, capture) > _score(still, capture) + 2
+    assert _score(moving, capture) > _score(still, capture) + 1
     loaded = TrainedHead.load(tmp_path / "4")
     assert _score(loaded, capture) == _score(moving, capture)
 

@@ -106,7 +106,8 @@ def planted_model(size: int) -> HeadModel:
     low = (-directions[:, 1]).clamp_min(0)  # (N,)
     model.displacement_basis.data[0, :, 1] = -0.004 * low
     model.displacement_basis.data[1, :, 2] = 0.002 * low
-    model.displacement_map.copy_(torch.randn(size + 1, 2, generator=generator) * 0.4)
+    for layer in model.move_network:
+        layer.copy_(torch.randn(layer.shape, generator=generator) * 0.2)
     return model
 
 

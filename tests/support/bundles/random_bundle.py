@@ -21,6 +21,7 @@ from ico3d.bundle.manifest import (
     Provenance,
     SpeechInfo,
 )
+from ico3d.common.expression import MOVE_HIDDEN
 
 EXPRESSION_SIZE, EYE_OFFSET, FPS, NUM_POSES = 39, 32, 25.0, 50
 
@@ -55,14 +56,22 @@ def random_head(num_gaussians: int, rank: int = 16, hidden: int = 128, seed: int
         basis=basis,
         basis_scale=np.full(num_gaussians, 0.02, np.float32),
         displacement_basis=moves,
-        displacement_map=np.random.default_rng([seed, 1])
-        .normal(0, 1e-5, (EXPRESSION_SIZE + 1, 2))
-        .astype(np.float32),
+        **_move_network(np.random.default_rng([seed, 1])),
         w1=rng.normal(0, 0.5, (EXPRESSION_SIZE, hidden)).astype(np.float32),
         b1=rng.normal(0, 0.5, hidden).astype(np.float32),
         w2=rng.normal(0, 0.3, (hidden, rank)).astype(np.float32),
         b2=np.zeros(rank, np.float32),
     )
+
+
+def _move_network(rng: np.random.Generator) -> dict[str, np.ndarray]:
+    layers = {
+        "displacement_w1": rng.normal(0, 0.2, (EXPRESSION_SIZE, MOVE_HIDDEN)),
+        "displacement_b1": rng.normal(0, 0.2, MOVE_HIDDEN),
+        "displacement_w2": rng.normal(0, 8e-6, (MOVE_HIDDEN, 2)),
+        "displacement_b2": rng.normal(0, 8e-6, 2),
+    }
+    return {name: values.astype(np.float32) for name, values in layers.items()}
 
 
 def near(directions: np.ndarray, centre: tuple[float, float, float], radius: float) -> np.ndarray:

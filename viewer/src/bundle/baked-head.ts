@@ -1,4 +1,5 @@
 import type { HeadInfo } from './manifest.ts';
+import { MOVE_HIDDEN } from '../shared.ts';
 import { takeTensor, type Tensor } from './safetensors.ts';
 
 /** Gaussians of a head: N of them, with K basis vectors, and M displacements. */
@@ -18,8 +19,19 @@ export interface HeadRows {
 /** A baked head (`docs/bundle.md`): its Gaussians, or the most important ones, and a small network from B values. */
 export interface BakedHead extends HeadRows {
   network: Network;
-  displacementMap: Float32Array; // (B+1,M) from an expression and a 1 to metres per unit of displacements
+  moving: Network; // from an expression to metres per unit of displacements, H = MOVE_HIDDEN
 }
+
+/** Of a head whose Gaussians stand still. */
+export const STILL: Network = {
+  inputs: 0,
+  hidden: 0,
+  outputs: 0,
+  w1: new Float32Array(0),
+  b1: new Float32Array(0),
+  w2: new Float32Array(0),
+  b2: new Float32Array(0),
+};
 
 /** c(e) = LeakyReLU(e·w1 + b1)·w2 + b2. */
 export interface Network {
@@ -39,16 +51,22 @@ export function readBakedHead(tensors: Map<string, Tensor>, head: HeadInfo, file
     takeTensor(tensors, name, dtype, shape, file).data as T;
   return {
     ...readHeadRows(tensors, n - rest, k, m, file),
-    displacementMap: m ? take('displacement_map', 'F32', [b + 1, m]) : new Float32Array(0),
-    network: {
-      inputs: b,
-      hidden: h,
-      outputs: k,
-      w1: take('w1', 'F32', [b, h]),
-      b1: take('b1', 'F32', [h]),
-      w2: take('w2', 'F32', [h, k]),
-      b2: take('b2', 'F32', [k]),
-    },
+    moving: m ? network(take, 'displacement_', b, MOVE_HIDDEN, m) : STILL,
+    network: network(take, '', b, h, k),
+  };
+}
+
+type Take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]) => T;
+
+function network(take: Take, prefix: string, inputs: number, hidden: number, outputs: number): Network {
+  return {
+    inputs,
+    hidden,
+    outputs,
+    w1: take(`${prefix}w1`, 'F32', [inputs, hidden]),
+    b1: take(`${prefix}b1`, 'F32', [hidden]),
+    w2: take(`${prefix}w2`, 'F32', [hidden, outputs]),
+    b2: take(`${prefix}b2`, 'F32', [outputs]),
   };
 }
 

@@ -2,7 +2,7 @@ import { LEAKY_SLOPE } from '../shared.ts';
 import type { Network } from '../bundle/baked-head.ts';
 
 /**
- * The basis coefficients of an expression: c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.
+ * The outputs of a head's network for an expression: c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.
  *
  * @param expression (B,)
  * @param out (K,) receives the coefficients
@@ -15,20 +15,5 @@ export function coefficients(network: Network, expression: Float32Array, out: Fl
     for (let b = 0; b < inputs; b++) sum += expression[b]! * w1[b * hidden + h]!;
     const active = sum < 0 ? LEAKY_SLOPE * sum : sum;
     for (let k = 0; k < outputs; k++) out[k]! += active * w2[h * outputs + k]!;
-  }
-}
-
-/**
- * How far a unit of each displacement is for an expression, metres: d(e) = [e, 1]·map.
- *
- * @param map (B+1,M)
- * @param expression (B,)
- * @param out (M,) receives the lengths
- */
-export function steps(map: Float32Array, expression: Float32Array, out: Float32Array): void {
-  const moves = out.length;
-  out.set(map.subarray(moves * expression.length));
-  for (let b = 0; b < expression.length; b++) {
-    for (let m = 0; m < moves; m++) out[m]! += expression[b]! * map[b * moves + m]!;
   }
 }

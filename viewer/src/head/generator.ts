@@ -1,6 +1,6 @@
 import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
 import { GrowingGenerator } from '../gaussians/growing.ts';
-import { coefficients, steps } from './coefficients.ts';
+import { coefficients } from './coefficients.ts';
 import { MOTION_SIZE, STILL } from './shoulders.ts';
 import { SoftHead, type ShownRows } from './soft.ts';
 
@@ -17,7 +17,7 @@ export class HeadGenerator extends GrowingGenerator {
   readonly bent: Float32Array;
   readonly soft: SoftHead;
   private readonly network: BakedHead['network'];
-  private readonly displacementMap: Float32Array;
+  private readonly moving: BakedHead['moving'];
   private readonly share: Uint8Array;
 
   /**
@@ -36,7 +36,7 @@ export class HeadGenerator extends GrowingGenerator {
     this.bent.set(STILL);
     this.soft = new SoftHead(this);
     this.network = head.network;
-    this.displacementMap = head.displacementMap;
+    this.moving = head.moving;
   }
 
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
@@ -55,7 +55,7 @@ export class HeadGenerator extends GrowingGenerator {
   /** Shows an expression (B,) from the next frame on. */
   express(expression: Float32Array): void {
     coefficients(this.network, expression, this.shown);
-    steps(this.displacementMap, expression, this.steps);
+    coefficients(this.moving, expression, this.steps);
     this.changed();
   }
 }

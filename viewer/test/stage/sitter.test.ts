@@ -2,7 +2,7 @@ import { Box3, Matrix4, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { HeadFiles } from '../../src/bundle/load.ts';
 import type { HeadInfo, Manifest } from '../../src/bundle/manifest.ts';
-import type { BakedHead } from '../../src/bundle/baked-head.ts';
+import { STILL, type BakedHead } from '../../src/bundle/baked-head.ts';
 import { eyesOf } from '../../src/head/eyes.ts';
 import { sitterOf } from '../../src/stage/camera/sitter.ts';
 import { random } from '../../support/random.ts';
@@ -35,7 +35,7 @@ function makeHead(origin = 0): BakedHead {
     basis,
     basisScale: new Float32Array(COUNT).fill(0.02),
     displacements: new Int8Array(0),
-    displacementMap: new Float32Array(0),
+    moving: STILL,
     network: { ...network, b1: new Float32Array(1), w2: new Float32Array([1]), b2: new Float32Array(1) },
   };
 }

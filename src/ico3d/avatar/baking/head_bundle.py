@@ -216,7 +216,7 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
     """A baked head that takes the expressions that drive avatars, instead of recorded ones.
 
     `TrainedHead.recorded` converts them, value by value and linearly, so it is merged into the
-    first layer of the coefficient network, and into the map of the displacements.
+    first layers of both networks.
 
     Args:
         baked: Takes expressions as they were recorded.
@@ -226,13 +226,13 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
     offset = head.recorded(np.zeros(size, np.float32))  # (B,)
     slope = head.recorded(np.ones(size, np.float32)) - offset  # (B,)
     bias = baked.b1 + offset.astype(np.float64) @ baked.w1
-    rows, rest = baked.displacement_map[:-1], baked.displacement_map[-1:]
-    moved = np.concatenate([slope[:, None] * rows, rest + offset[None] @ rows])  # (B + 1, M)
+    moved = baked.displacement_b1 + offset.astype(np.float64) @ baked.displacement_w1
     return replace(
         baked,
         w1=slope[:, None] * baked.w1,
         b1=bias.astype(np.float32),
-        displacement_map=moved.astype(np.float32),
+        displacement_w1=slope[:, None] * baked.displacement_w1,
+        displacement_b1=moved.astype(np.float32),
     )
 
 

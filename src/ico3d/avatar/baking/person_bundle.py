@@ -126,23 +126,24 @@ def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
         scales=torch.from_numpy(head.scales.astype(np.float64)).exp(),
         opacities=torch.ones(head.num_gaussians),
     ).transform(a_from_b)
-    basis, mapping = _turned_displacements(head, a_from_b[:3, :3])
     return replace(
         head,
-        displacement_basis=basis,
-        displacement_map=mapping,
+        **_turned_displacements(head, a_from_b[:3, :3]),
         means=moved.means.numpy().astype(np.float32),
         quats=torch.nn.functional.normalize(moved.quats).numpy().astype(np.float16),
         scales=moved.scales.log().numpy().astype(np.float16),
     )
 
 
-def _turned_displacements(head: BakedHead, linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (M, N, 3) after a rotation with a scale (3, 3), and their map (B + 1, M)."""
+def _turned_displacements(head: BakedHead, linear: np.ndarray) -> dict[str, np.ndarray]:
+    """Displacements after a rotation with a scale (3, 3), and the layer that has their unit."""
     turned = head.displacement_basis @ linear.T.astype(np.float32)  # (M, N, 3)
     units = np.maximum(np.abs(turned).max(axis=(1, 2)) / 127, 1e-9)  # (M,)
-    basis = np.rint(turned / units[:, None, None]).astype(np.int8)
-    return basis, (head.displacement_map * units).astype(np.float32)
+    return {
+        "displacement_basis": np.rint(turned / units[:, None, None]).astype(np.int8),
+        "displacement_w2": (head.displacement_w2 * units).astype(np.float32),
+        "displacement_b2": (head.displacement_b2 * units).astype(np.float32),
+    }
 
 
 def measure(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -> Loss:

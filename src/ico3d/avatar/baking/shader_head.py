@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ico3d.avatar.baking.distil import CoefficientNetwork, augmented, distil
 from ico3d.avatar.baking.lowrank import LowRank, factorise
 from ico3d.avatar.baking.quantise import quantise
 from ico3d.bundle.head import BakedHead, no_displacements
 from ico3d.common.spread import spread
 from ico3d.errors import BundleError
+from ico3d.head.blending.distil import CoefficientNetwork, augmented, distil
 from ico3d.head.model import HeadModel
 from ico3d.splat.convention import MIN_ALPHA
 
@@ -133,15 +133,18 @@ def _geometry(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _displacements(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
-    """Displacements in 8-bit numbers, with the size of a unit in the map."""
+    """Displacements in 8-bit numbers, with the size of a unit in the network's last layer."""
     if not model.shape.displacements:
         return no_displacements(len(kept), model.shape.expression_size)
     basis = model.displacement_basis.detach().cpu().numpy()[:, kept]  # (M, N, 3)
     units = np.maximum(np.abs(basis).max(axis=(1, 2)) / 127, 1e-9)  # (M,)
-    mapping: torch.Tensor = model.displacement_map  # type: ignore[assignment]
+    w1, b1, w2, b2 = (part.cpu().numpy() for part in model.move_network)
     return {
         "displacement_basis": np.rint(basis / units[:, None, None]).astype(np.int8),
-        "displacement_map": (mapping.cpu().numpy() * units).astype(np.float32),  # (B + 1, M)
+        "displacement_w1": w1,
+        "displacement_b1": b1,
+        "displacement_w2": (w2 * units).astype(np.float32),
+        "displacement_b2": (b2 * units).astype(np.float32),
     }
 
 

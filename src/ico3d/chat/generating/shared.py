@@ -7,10 +7,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ico3d.bundle import evaluate, limits, manifest
+from ico3d.bundle import limits, manifest
 from ico3d.chat.observing.timing import PARTS
 from ico3d.chat.wire.protocol_visits import MAX_NOTE, MAX_NOTES
-from ico3d.common.expression import EYE_NAMES, LIDS, MOST_DISPLACEMENTS
+from ico3d.common.expression import EYE_NAMES, LEAKY_SLOPE, LIDS, MOST_DISPLACEMENTS, MOVE_HIDDEN
 from ico3d.common.spz import container
 from ico3d.motion import roles
 from ico3d.rig import shadow_map
@@ -49,6 +49,7 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             "file_bytes": limits.MAX_FILE_BYTES,
         },
     ),
+    ("MOVE_HIDDEN", "Width of the network of a head's displacements.", MOVE_HIDDEN),
     ("MAX_SHAPES", "Residual shapes of a body on a skeleton.", limits.MAX_SHAPES),
     ("MAX_JOINTS", "Of a body's skeleton; rig/rig.py.", MOST_JOINTS),
     ("MAX_CLUSTERS", "Groups of Gaussians in a window that move alike.", limits.MAX_CLUSTERS),
@@ -68,7 +69,7 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ),
     ("MAX_NOTES", "Sentences of earlier visits; chat/wire/protocol_visits.py.", MAX_NOTES),
     ("MAX_NOTE", "Characters of each.", MAX_NOTE),
-    ("LEAKY_SLOPE", "Of a head's coefficients; bundle/evaluate.py.", evaluate.LEAKY_SLOPE),
+    ("LEAKY_SLOPE", "Of a head's networks; common/expression.py.", LEAKY_SLOPE),
     ("LID_NAMES", "The eyelids among blendshapes.", [EYE_NAMES[lid] for lid in LIDS]),
     ("LIDS", "Their places in the eye and brow values; common/expression.py.", LIDS),
     (

@@ -7,12 +7,17 @@ Sound does not tell all of where lips are. So skin is learnt where landmarks wer
 what an expression tells of that place decides where it is drawn: a little off at times, but sharp.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-DAMPING = 0.01
-"""Damping of the regression from expressions, relative to the variance of a value."""
+from ico3d.common.expression import MOVE_HIDDEN
+from ico3d.head.blending.distil import CoefficientNetwork, distil
+
+NOISE, COPIES, STEPS = 0.3, 20, 1500
+"""Noise in deviations of each value of an expression, copies of each frame, and steps of the fit of
+the network from expressions: 1.03 mm of error on frames that were not seen, where linear regression
+has 1.22 (docs/choices.md)."""
 NEAREST, FARTHEST = 0.004, 0.016
 """Least and largest reach of a landmark in metres, else its distance from its neighbour."""
 STILL = 1.5
@@ -90,18 +95,22 @@ def principal(landmarks: np.ndarray, motion: np.ndarray, count: int) -> Displace
     return Displacement(landmarks, modes, mean.reshape(-1, 3))
 
 
-def told(expressions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
-    """(B + 1, M) float32 from an expression and a 1 to coefficients, by ridge regression.
+def told(
+    expressions: np.ndarray, coefficients: np.ndarray, sizes: np.ndarray
+) -> CoefficientNetwork:
+    """Fits the network from expressions to coefficients.
+
+    It learns from copies of the frames with noise: what is alike in them, instead of each by heart.
 
     Args:
         expressions: (F, B) expressions of frames.
-        coefficients: (F, M) of the same frames; rows that are not known are NaN.
+        coefficients: (F, M) coefficients of the same frames.
+        sizes: (M,) positive; by how much an error of each coefficient counts.
     """
-    known = np.isfinite(coefficients).all(1)
-    inputs, targets = expressions[known].astype(np.float64), coefficients[known]
-    middle, size = inputs.mean(0), inputs.std(0) + 1e-6
-    unit = (inputs - middle) / size
-    gram = unit.T @ unit + DAMPING * len(unit) * np.eye(unit.shape[1])  # (B, B)
-    slope = np.linalg.solve(gram, unit.T @ (targets - targets.mean(0))) / size[:, None]  # (B, M)
-    rest = targets.mean(0) - middle @ slope  # (M,)
-    return np.concatenate([slope, rest[None]]).astype(np.float32)
+    rng = np.random.default_rng(0)
+    size = NOISE * expressions.std(0)  # (B,)
+    noisy = [expressions + size * rng.normal(size=expressions.shape) for _ in range(COPIES)]
+    inputs = np.concatenate(noisy).astype(np.float32)  # (F · COPIES, B)
+    targets = np.concatenate([coefficients * sizes] * COPIES)  # (F · COPIES, M)
+    network = distil(inputs, targets, MOVE_HIDDEN, STEPS, seed=0)
+    return replace(network, w2=network.w2 / sizes, b2=network.b2 / sizes)

@@ -1,4 +1,4 @@
-"""Fits the small network that maps an expression to coefficients of a baked head's basis."""
+"""Fits small networks that map an expression to a few coefficients."""
 
 import contextlib
 import math
@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.bundle.evaluate import LEAKY_SLOPE
+from ico3d.common.expression import LEAKY_SLOPE
 from ico3d.training.optimiser import Optimiser
 
 _BATCH, _RATE = 512, 1e-2
