@@ -1,6 +1,6 @@
 """How near a head's pictures are to its recording, both at another size.
 
-    python bench/heads/at_size.py HEAD CAPTURE --size 512
+    python bench/heads/at_size.py HEAD CAPTURE --size 512 [--seen]
 
 Metrics are those of `ico3d evaluate`, on the same unseen frames. Recorded pictures, masks and
 landmarks are scaled down by areas; the head is drawn by cameras of that size.
@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import tyro
+from seen import SeenHead
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
@@ -77,17 +78,21 @@ class Bench:
         head: Folder of a trained head.
         capture: Its recording.
         size: Height of the pictures in pixels.
+        seen: Skin is where landmarks were seen, instead of where the expression tells it to be.
     """
 
     head: tyro.conf.Positional[Path]
     capture: tyro.conf.Positional[Path]
     size: int = 512
+    seen: bool = False
 
     def run(self) -> None:
         """Prints the metrics."""
         head, capture = TrainedHead.load(self.head), open_capture(self.capture)
         cameras, frames = scored_pictures(capture, "test")
         check_untrained(head.records, capture, cameras, frames)
+        if self.seen:
+            head = SeenHead(**vars(head))
         part = PartOfCapture(Smaller(capture, self.size), cameras, frames)
         for name, value in evaluate_head(head, part, frames, None).items():
             if isinstance(value, float):
