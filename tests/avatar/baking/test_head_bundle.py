@@ -78,6 +78,19 @@ def test_what_matters_most_comes_first(fitted):
     np.testing.assert_array_equal(baked.means, expected)
 
 
+def test_brows_eyes_and_lips_come_before_what_is_as_important(fitted):
+    head, capture, _ = fitted
+    recorded = expressions(head, capture, capture.split.train)
+    means = head.model.means.detach().numpy()
+    landmarks = np.tile(means[:1] + 1.0, (68, 1))  # a metre away
+    landmarks[17:27], landmarks[36:48], landmarks[48:68] = means[200], means[100], means[50]
+    landmarks[27] = means[150]  # the nose is no such feature
+    one = np.ones((len(means), 4), np.float32)
+    baked = HeadBaker(head.model, recorded, one, 2, replace(QUICK, steps=1), landmarks).baked(2)
+    first = np.linalg.norm(means[:, None] - baked.means[:3], axis=-1).argmin(0)
+    assert set(first.tolist()) == {50, 100, 200}
+
+
 def test_gaussians_that_are_never_drawn_are_dropped(blendshape_head):
     head, capture = blendshape_head
     with torch.no_grad():

@@ -99,7 +99,8 @@ def bake(
     report("sampling the exact head …")
     chosen = settings or BakeSettings()
     most = rank or RANKS[-1]
-    baker = HeadBaker(head.model, samples.expressions, samples.importance, most, chosen)
+    given = (samples.expressions, samples.importance, most, chosen, head.landmarks)
+    baker = HeadBaker(head.model, *given)
     results = []
     for candidate in (rank,) if rank else RANKS:
         baked = baker.baked(candidate)

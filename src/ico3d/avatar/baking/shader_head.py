@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scipy.spatial import KDTree
 
 from ico3d.avatar.baking.lowrank import LowRank, factorise
 from ico3d.avatar.baking.quantise import quantise
 from ico3d.bundle.head import BakedHead, no_displacements
+from ico3d.capture.face.region import BROWS, EYES, MOUTH
 from ico3d.common.spread import spread
 from ico3d.errors import BundleError
 from ico3d.head.blending.distil import CoefficientNetwork, augmented, distil
@@ -16,6 +18,10 @@ from ico3d.splat.convention import MIN_ALPHA
 
 CLIP = 8.0
 """Logits are clipped to ±8: beyond, their sigmoids differ by less than 1/2,980."""
+
+
+ATTENTION, NEAR = 7.0, 0.006
+"""By how much more brows, eyes and lips are looked at, and the metres about their landmarks."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,7 @@ class HeadBaker:
         importance: np.ndarray,
         rank: int,
         settings: BakeSettings = BakeSettings(),
+        landmarks: np.ndarray | None = None,
     ):
         """Samples the model and fits its principal components and coefficient network.
 
@@ -56,6 +63,8 @@ class HeadBaker:
             importance: (N, 4) how much an error in each logit matters.
             rank: Largest rank that `baked` will be asked for.
             settings: Settings of the fit.
+            landmarks: (68, 3) landmarks of the face, by whose features people are recognised: the
+                Gaussians there come earlier than by their importance.
 
         Raises:
             BundleError: If no Gaussian is ever opaque enough to be drawn.
@@ -63,7 +72,8 @@ class HeadBaker:
         chosen = expressions[spread(len(expressions), settings.max_frames)]
         samples = sample_logits(model, chosen)  # (T, N, 4)
         seen = (samples[:, :, 3] > np.log(MIN_ALPHA / (1 - MIN_ALPHA))).any(axis=0)  # (N,)
-        order = np.argsort(-importance.sum(axis=1), kind="stable")  # (N,)
+        looked_at = importance.sum(axis=1) * _attention(model, landmarks)  # (N,)
+        order = np.argsort(-looked_at, kind="stable")  # (N,)
         self._kept = order[seen[order]]  # (N',) indices, those that matter most first
         if len(self._kept) == 0:
             raise BundleError("the head has no Gaussian that is ever seen: train it again.")
@@ -102,6 +112,15 @@ class HeadBaker:
         inputs = np.concatenate([recorded, made])  # (T + A, B)
         targets = np.concatenate(scores)  # (T + A, K)
         return distil(inputs, targets, settings.hidden, settings.steps, settings.seed)
+
+
+def _attention(model: HeadModel, landmarks: np.ndarray | None) -> np.ndarray:
+    """(N,) how much more a Gaussian is looked at than one of the same importance elsewhere."""
+    if landmarks is None:
+        return np.ones(len(model))
+    features = KDTree(np.concatenate([landmarks[BROWS], landmarks[EYES], landmarks[MOUTH]]))
+    away = features.query(model.means.detach().cpu().numpy())[0]  # (N,)
+    return 1 + ATTENTION * np.exp(-0.5 * (away / NEAR) ** 2)
 
 
 def sample_logits(model: HeadModel, expressions: np.ndarray) -> np.ndarray:

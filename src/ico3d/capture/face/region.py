@@ -7,8 +7,8 @@ import numpy as np
 from ico3d.errors import ModelError
 
 CHIN, JAW_CORNERS, JAW_ENDS, BROWS, BRIDGE = 8, (4, 12), (0, 16), slice(17, 27), 27
-JAW, MOUTH = slice(2, 15), slice(48, 68)
-"""Indices of Multi-PIE landmarks along the jaw and about the mouth; so are the names above."""
+JAW, EYES, MOUTH = slice(2, 15), slice(36, 48), slice(48, 68)
+"""Indices of Multi-PIE landmarks along the jaw, of lids and of lips; so are the names above."""
 BELOW_JAW = 0.2
 """How far below the jaw line the head's region ends: a chin goes down as a mouth opens.
 
