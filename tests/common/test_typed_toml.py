@@ -16,11 +16,25 @@ from ico3d.errors import BundleError, SettingsError
 def test_a_key_of_many_parts_is_refused_at_once(tmp_path, part):
     file, started = tmp_path / "strange.toml", time.monotonic()
     file.write_text(".".join([part] * 30_000) + " = 1")
-    with pytest.raises(SettingsError, match="a key has more than 100 parts"):
+    with pytest.raises(SettingsError, match="keys have too many parts"):
         read_settings(file)
-    with pytest.raises(BundleError, match="a key has more than 100 parts"):
+    with pytest.raises(BundleError, match="keys have too many parts"):
         read_persona(file)
     assert time.monotonic() - started < 5
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ".".join(["a"] * 2500) + '."=".' + ".".join(["a"] * 2500) + " = 1",
+        'x = {a = """\n""", a."=".' + ".".join(["a"] * 5000) + " = 1}",
+        "\n".join(f"[x{i}.{'.'.join(['a'] * 99)}]" for i in range(2000)),
+    ],
+    ids=["a key that holds a sign", "behind a text of several lines", "many tables"],
+)
+def test_keys_of_many_parts_are_refused_however_they_are_written(text):
+    with pytest.raises(ValueError, match="keys have too many parts"):
+        parse_toml(text)
 
 
 def test_a_note_of_many_sentences_is_none():

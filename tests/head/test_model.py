@@ -134,6 +134,15 @@ def test_a_file_brings_the_displacements_back(tmp_path):
     assert loaded.shape.displacements == 2 and torch.equal(loaded(e).means, model(e).means)
 
 
+@pytest.mark.parametrize("name", ["displacement_basis", "move_w1", "move_b2"])
+def test_displacements_that_are_no_numbers_are_refused(tmp_path, name):
+    model = _moving(torch.float32)
+    getattr(model, name).data.view(-1)[0] = math.nan
+    model.save(tmp_path / "model.safetensors")
+    with pytest.raises(ModelError, match="its displacements are not finite"):
+        HeadModel.load(tmp_path / "model.safetensors")
+
+
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_only_static_ignores_the_expression(variant):
     model = _model(variant)

@@ -1,6 +1,5 @@
 """Reads a synthetic capture (docs/captures/synthetic.md, "Synthetic captures")."""
 
-import wave
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
 from ico3d.common.files import json_of, read_small
 from ico3d.common.people.stated import NOBODY
-from ico3d.common.sound import WAV_ERRORS, open_claim
+from ico3d.common.sound import WAV_ERRORS, open_claim, open_wav
 from ico3d.common.unpacking.heads import load_bounded
 from ico3d.errors import CaptureError
 
@@ -104,7 +103,7 @@ class SyntheticCapture(RecordedCapture):
         """
         file = self.path / "audio.wav"
         try:
-            with wave.open(str(file), "rb") as sound:
+            with file.open("rb") as content, open_wav(content) as sound:
                 if sound.getnchannels() != 1 or sound.getsampwidth() != 2:
                     raise CaptureError(f"the sound {file} is not mono with 16 bits.")
                 check_claim(file, open_claim(sound, file.stat().st_size))

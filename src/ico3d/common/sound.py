@@ -12,7 +12,7 @@ import struct
 import wave
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ MOST_CHANNELS = 64
 MOST_BYTES = 2 << 30  # of decoded samples
 RECORDING = 2 * 3600.0  # s of a recording that someone made on purpose
 REQUEST = 600.0  # s of a sound that another machine sends, or of one that it is asked for
+MOST_CHUNKS = 64  # before the sound of a WAV file; other programs write fewer than ten
 WAV_ERRORS = (wave.Error, EOFError, RuntimeError)
 """What `wave` raises for damaged files; RuntimeError where a chunk claims more than its parent."""
 _WAV = struct.Struct("<4s4x4s4s4xHHI6xH")  # up to the width of a sample, of a plain WAV file
@@ -73,6 +74,26 @@ def file_claim(path: Path) -> Claim:
 
     info = soundfile.info(str(path))
     return Claim(info.samplerate, info.channels, info.frames)
+
+
+def open_wav(file: BinaryIO) -> wave.Wave_read:
+    """Opens a WAV file, if its sound comes after few chunks.
+
+    Python's `wave` goes through millions of empty ones, seconds long, and holds up all threads.
+
+    Raises:
+        wave.Error: If the file is no WAV file, or has more than `MOST_CHUNKS` before its sound.
+        EOFError: If the file ends too early.
+    """
+    file.seek(12)
+    for _ in range(MOST_CHUNKS):
+        head = file.read(8)
+        if len(head) < 8 or head[:4] == b"data":
+            file.seek(0)
+            return wave.open(file, "rb")
+        size = int.from_bytes(head[4:], "little")
+        file.seek(size + size % 2, io.SEEK_CUR)
+    raise wave.Error(f"more than {MOST_CHUNKS} chunks before its sound")
 
 
 def open_claim(sound: wave.Wave_read, size: int) -> Claim:

@@ -24,6 +24,7 @@ from ico3d.training.checkpoint import (
     load_tensors,
     save_tensors,
 )
+from ico3d.training.finite import all_finite
 
 Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
@@ -357,7 +358,10 @@ class HeadModel(nn.Module):
                 )
             shape, count = HeadShape(**fields), tensors["means"].shape[0]
             check_shapes(lambda: cls(shape, count), tensors)
+            moving = ("displacement_basis", *MOVE_NETWORK)
             check_places(tensors["means"])
+            if not all(all_finite(tensors[name]) for name in moving if name in tensors):
+                raise ValueError("its displacements are not finite")
             check_width(count, shape.hidden, shape.mlp_inputs)
             model = cls(shape, count)
             model.load_state_dict(tensors)

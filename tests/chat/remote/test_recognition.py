@@ -121,6 +121,18 @@ def test_a_part_that_claims_more_than_the_file_is_refused():
         read_wav(io.BytesIO(bytes(data)))
 
 
+@pytest.mark.parametrize(
+    "chunk", [b"abcd\0\0\0\0", b"abcd\1\0\0\0xx", b"fmt \x10\0\0\0" + bytes(16)]
+)
+def test_a_file_of_many_chunks_is_refused_before_they_are_gone_through(chunk):
+    data = wav(RATE, 1, 16, 3200, bytes(3200))
+    many = data[:12] + chunk * 65 + data[12:]
+    with pytest.raises(ProtocolError, match="more than 64 chunks before its sound"):
+        read_wav(io.BytesIO(many))
+    few = data[:12] + b"abcd\1\0\0\0xx" * 60 + data[12:]
+    assert len(read_wav(io.BytesIO(few))) == 1600
+
+
 def test_a_file_that_claims_more_than_it_holds_is_read():
     pcm = read_wav(io.BytesIO(wav(RATE, 1, 16, 0xFFFFFFFE, bytes(3200))))
     assert len(pcm) == 1600

@@ -21,7 +21,7 @@ from starlette.datastructures import UploadFile
 from ico3d.chat.remote.asked import form_of
 from ico3d.chat.remote.headless import Spares, run
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, MICROPHONE_RATE
-from ico3d.common.sound import REQUEST, WAV_ERRORS, fault, open_claim
+from ico3d.common.sound import REQUEST, WAV_ERRORS, fault, open_claim, open_wav
 from ico3d.errors import ProtocolError
 from ico3d.speech.mel import resampling_stream
 
@@ -87,7 +87,7 @@ def read_wav(file: BinaryIO) -> np.ndarray:
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     try:
-        with wave.open(file, "rb") as sound:
+        with open_wav(file) as sound:
             pieces = list(_pieces(sound, size))
     except WAV_ERRORS as error:
         raise ProtocolError(f"the file is no WAV file of PCM samples ({error}).") from None

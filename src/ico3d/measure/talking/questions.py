@@ -1,6 +1,5 @@
 """What is said to an avatar under test: recordings of people, or synthetic voices."""
 
-import wave
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 from ico3d.capture.sound import check_claim
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
 from ico3d.common.espeak.speech import synthesize
-from ico3d.common.sound import WAV_ERRORS, open_claim
+from ico3d.common.sound import WAV_ERRORS, open_claim, open_wav
 from ico3d.errors import CaptureError
 
 QUESTIONS = ("Who are you?", "What can you do?", "Tell me about yourself.", "How do you work?")
@@ -62,7 +61,7 @@ def read_recording(path: Path) -> np.ndarray:
         CaptureError: If the file is no PCM16 mono WAV of 16 kHz, or contains only silence.
     """
     try:
-        with wave.open(str(path)) as file:
+        with path.open("rb") as content, open_wav(content) as file:
             form = (file.getnchannels(), file.getsampwidth(), file.getframerate())
             if form != (1, 2, MICROPHONE_RATE):
                 raise CaptureError(f"{path}: must be PCM16, mono, 16 kHz.")
