@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from ico3d.bundle.format import Bundle, write_bundle
-from ico3d.bundle.head import BakedHead, poses_to_bytes
+from ico3d.bundle.head import BakedHead, no_displacements, poses_to_bytes
 from ico3d.bundle.manifest import CameraInfo, HeadInfo, Loss, Manifest, Persona, Provenance
 
 SIZE = 2  # expression values
@@ -33,6 +33,7 @@ def phase_head() -> BakedHead:
         mean_logits=np.float16([[0, 0, 0, 8]]),
         basis=basis,
         basis_scale=np.full(1, STEP),
+        **no_displacements(1, SIZE),
         w1=signs,
         b1=np.zeros(2 * SIZE, np.float32),
         w2=signs.T / np.float32(1.02),
