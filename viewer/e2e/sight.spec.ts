@@ -118,7 +118,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     for (let notch = 0; notch < 3; notch++) await page.mouse.wheel(0, -250);
     await settled();
     const after = await seeEyes(page);
-    console.log(`eyes ${before.apart.toFixed(3)} wide, then ${after.apart.toFixed(3)}`);
+    console.log(`eyes ${before.apart.toFixed(3)} wide at ${before.x.toFixed(3)}, ${before.y.toFixed(3)}, then ${after.apart.toFixed(3)} at ${after.x.toFixed(3)}, ${after.y.toFixed(3)}`);
     expect(after.apart / before.apart).toBeGreaterThan(1.8);
     expect(Math.hypot(after.x - before.x, after.y - before.y)).toBeLessThan(0.03);
     for (let notch = 0; notch < 5; notch++) await page.mouse.wheel(0, -250);

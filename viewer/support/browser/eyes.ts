@@ -14,7 +14,7 @@ export interface Eyes {
 export function seeEyes(page: Page): Promise<Eyes> {
   return page.evaluate(async () => {
     const LIDS = [37, 38];
-    const LEAST = 40; // levels of 255, of three colours together
+    const LEAST = 90; // levels of 255, of three colours together: skin about the lids moves with them, too
     const { stage, head } = window.ico3d!;
     const gl = stage.renderer.getContext();
     const director = head!.director;
