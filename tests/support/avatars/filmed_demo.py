@@ -14,7 +14,7 @@ from ico3d.avatar.joining.similarity import moved
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.body.settings import settings_for
 from ico3d.bundle import packaged
-from ico3d.bundle.evaluate import logits
+from ico3d.bundle.evaluate import centres, logits
 from ico3d.bundle.format import Bundle
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
@@ -48,8 +48,9 @@ def head_abroad() -> TrainedHead:
     """The demo's head at rest as a head model of its own studio, without landmarks."""
     baked = demo().head
     model = HeadModel(head_shape(baked.expression_size, "static"), baked.num_gaussians)
-    rest = logits(baked, np.zeros(baked.expression_size, np.float32))  # (N, 4)
-    model.means.data = torch.tensor(baked.means)
+    silent = np.zeros(baked.expression_size, np.float32)
+    rest = logits(baked, silent)  # (N, 4)
+    model.means.data = torch.from_numpy(centres(baked, silent))
     model.quats.data = torch.tensor(baked.quats.astype(np.float32))
     model.log_scales.data = torch.tensor(baked.scales.astype(np.float32))
     model.basis.data = torch.from_numpy(rest)[None].clone()  # (1, N, 4)
