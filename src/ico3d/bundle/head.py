@@ -39,7 +39,7 @@ _MAX_LENGTH = 1e4
 class BakedHead:
     """N Gaussians in canonical head space; colour and opacity are low-rank in the expression.
 
-    Where there are M > 0 displacements, Gaussians also move, linearly in the expression. Baked
+    Where there are M > 0 displacements, Gaussians also move with the expression. Baked
     heads have their Gaussians sorted by importance.
 
     Attributes:

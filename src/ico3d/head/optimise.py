@@ -31,8 +31,8 @@ from ico3d.training.epochs import Epochs
 from ico3d.training.optimiser import Optimiser, check_moments
 
 CPU = torch.device("cpu")
-GEOMETRY = {"means": 0, "quats": 0, "log_scales": 0, "displacement_basis": 1}
-"""Parameters that say where and how large Gaussians are, with the axis of the Gaussians."""
+GEOMETRY = ("means", "quats", "log_scales", "displacement_basis")
+"""Parameters that say where and how large Gaussians are."""
 
 LEAST_TOLD = 0.5
 """If any picture has a mask or a plate, at least this share of the pictures must have one."""
@@ -128,7 +128,8 @@ class HeadTrainer:
         background, target = self._staged(view, picture, index)
         expression = self.expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
-        gaussians = self.model.gaussians(self._decode(features, expression), self.moves(view))
+        moves = self.moves(view, expression)
+        gaussians = self.model.gaussians(self._decode(features, expression), moves)
         gaussians = self.posed(gaussians.up_to_degree(index // self._settings.sh_every), view)
         absgrad = self._settings.density.absgrad
         rendering = render(gaussians, [view.camera], background, absgrad=absgrad)
@@ -151,11 +152,11 @@ class HeadTrainer:
             expression = torch.cat([expression, self._turns[view.frame]])  # (B + 3,)
         return expression.to(self.model.device)
 
-    def moves(self, view: View) -> Tensor:
+    def moves(self, view: View, expression: Tensor) -> Tensor:
         """Coefficients (M,) of the displacements in a view's frame: seen, or else told."""
         if (seen := self.seen_moves.get(view.frame)) is not None:
             return seen
-        return self.model.moves(self.expression(view).detach())
+        return self.model.moves(expression.detach())
 
     def posed(self, gaussians: Gaussians, view: View) -> Gaussians:
         """The head's Gaussians with the shoulders where they are in a view's frame."""
@@ -285,10 +286,11 @@ class HeadTrainer:
         weights = model.row_weights(expression)
         features = blend_of(model.basis, weights, chosen).requires_grad_()  # (n, w)
         fixed = {name: value.detach() for name, value in model.named_parameters()}
-        for name, axis in GEOMETRY.items() & model.gaussian_axes.items():
-            fixed[name] = fixed[name].index_select(axis, chosen)  # (n, ...)
+        for name, axis in model.gaussian_axes.items():
+            if name in GEOMETRY:
+                fixed[name] = fixed[name].index_select(axis, chosen)  # (n, ...)
         gaussians: Gaussians = functional_call(
-            model, fixed, (expression, features, self.moves(part))
+            model, fixed, (expression, features, self.moves(part, expression))
         )
         rendering = render(gaussians, [part.camera], background)
         self._loss(rendering, target, picture, index).backward()
@@ -364,7 +366,9 @@ class HeadTrainer:
         chosen = rng.choice(len(self.views), size=min(SAMPLES, len(self.views)), replace=False)
         opacities, given = [], []
         for view in (self.views[i] for i in chosen):
-            gaussians = self.posed(self.model(self.expression(view), moves=self.moves(view)), view)
+            expression = self.expression(view)  # (B,)
+            drawn = self.model(expression, moves=self.moves(view, expression))
+            gaussians = self.posed(drawn, view)
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])
         return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))

@@ -14,6 +14,7 @@ from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baking import body_bundle, body_cost, head_bundle, head_cost
 from ico3d.avatar.baking.body_bundle import BodyParts
 from ico3d.avatar.baking.persona import spoken_texts
+from ico3d.avatar.baking.quantise import in_units
 from ico3d.avatar.baking.samples import (
     Samples,
     expressions_at,
@@ -137,10 +138,9 @@ def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
 
 def _turned_displacements(head: BakedHead, linear: np.ndarray) -> dict[str, np.ndarray]:
     """Displacements after a rotation with a scale (3, 3), and the layer that has their unit."""
-    turned = head.displacement_basis @ linear.T.astype(np.float32)  # (M, N, 3)
-    units = np.maximum(np.abs(turned).max(axis=(1, 2)) / 127, 1e-9)  # (M,)
+    values, units = in_units(head.displacement_basis @ linear.T.astype(np.float32))
     return {
-        "displacement_basis": np.rint(turned / units[:, None, None]).astype(np.int8),
+        "displacement_basis": values,
         "displacement_w2": (head.displacement_w2 * units).astype(np.float32),
         "displacement_b2": (head.displacement_b2 * units).astype(np.float32),
     }

@@ -29,6 +29,12 @@ class QuantisedBasis:
         return self.gains[:, None, None] * self.scale[None, :, None] * self.values
 
 
+def in_units(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors (M, N, 3) in 8-bit numbers, and the size (M,) of a unit of each."""
+    units = np.maximum(np.abs(vectors).max(axis=(1, 2)) / 127, 1e-9)  # (M,)
+    return np.rint(vectors / units[:, None, None]).astype(np.int8), units
+
+
 def quantise(basis: np.ndarray, sizes: np.ndarray, weights: np.ndarray) -> QuantisedBasis:
     """Rounds a basis so that the error of basis · scores is small.
 

@@ -7,7 +7,7 @@ import torch
 from scipy.spatial import KDTree
 
 from ico3d.avatar.baking.lowrank import LowRank, factorise
-from ico3d.avatar.baking.quantise import quantise
+from ico3d.avatar.baking.quantise import in_units, quantise
 from ico3d.bundle.head import BakedHead, no_displacements
 from ico3d.capture.face.region import BROWS, EYES, MOUTH
 from ico3d.common.spread import spread
@@ -156,10 +156,10 @@ def _displacements(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
     if not model.shape.displacements:
         return no_displacements(len(kept), model.shape.expression_size)
     basis = model.displacement_basis.detach().cpu().numpy()[:, kept]  # (M, N, 3)
-    units = np.maximum(np.abs(basis).max(axis=(1, 2)) / 127, 1e-9)  # (M,)
+    values, units = in_units(basis)
     w1, b1, w2, b2 = (part.cpu().numpy() for part in model.move_network)
     return {
-        "displacement_basis": np.rint(basis / units[:, None, None]).astype(np.int8),
+        "displacement_basis": values,
         "displacement_w1": w1,
         "displacement_b1": b1,
         "displacement_w2": (w2 * units).astype(np.float32),
