@@ -94,7 +94,7 @@ class Shot:
 
 HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
 """Two minutes of talk, each frame from another side; every second frame of a film would repeat."""
-BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=10)
+BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=14)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5500 "

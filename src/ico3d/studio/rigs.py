@@ -20,24 +20,24 @@ class Framing:
         height: Height of the visible field at the head, metres.
         aim: Height of the point that cameras look at, metres relative to the canonical origin at
             rest.
+        aspect: Width of the pictures divided by their height.
     """
 
     height: float
     aim: float
+    aspect: float = 1.0
 
 
 ARCS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
 """The head fills three quarters of a `head` picture and half of a `bust` picture."""
 
-BODY = Framing(2.36, 1.05)
+BODY = Framing(2.36, 1.05, 0.62)
 """A person from the floor to above raised hands; `aim` is a height above the floor here."""
-UPPER_BODY = Framing(0.9, 1.31)
-"""From the hips to above the head; `aim` is a height above the floor here, too."""
+UPPER_BODY = Framing(0.9, 1.31, 1.2)
+"""From the hips to above the head, hands that wave included; `aim` is a height above the floor."""
 UPPER_ARC = 100.0
 """Widest azimuth of cameras before an upper body, degrees to either side."""
 BODY_DISTANCE = 2.8
-ASPECT = 0.62
-"""Width of a picture of a body divided by its height."""
 RINGS = (-7.0, 5.0, 17.0)
 """Elevation angles of the rings of cameras around a body, degrees."""
 RIGS = (*ARCS, "body")
@@ -86,7 +86,7 @@ def _on_rings(
     framing: Framing, azimuths: np.ndarray, height: int, first: int = 0
 ) -> tuple[Camera, ...]:
     """Cameras around a standing person at azimuths (C,) in degrees, on one ring after the other."""
-    width = 2 * round(ASPECT * height / 2)
+    width = 2 * round(framing.aspect * height / 2)
     focal = height * BODY_DISTANCE / framing.height
     intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     target = np.array([0.0, framing.aim, 0.0])

@@ -195,6 +195,8 @@ class Studio:
             self._tailored.fields,
             self._tailored.folds(vertices),
             eye_rows(subject, vertices),
+            self._paint.hands.lines,
+            self._paint.hands.nails,
         )
 
     def _occlusion(self, vertices: np.ndarray, gap: float) -> np.ndarray:

@@ -10,9 +10,12 @@ from ico3d.body.model_folder import TrainedBody
 from ico3d.body.planning.windows import Window
 from ico3d.body.skinning.skinned import Skinned
 from ico3d.body.skinning.template import sampled
+from ico3d.body.training.prepare_skinned import DENSER, MOST_DENSE, SHORT, detail
 from ico3d.body.training.standing_off import standing_off
 from ico3d.body.training.train_clip import train_body
 from ico3d.errors import CaptureError
+from ico3d.rig.binding import Binding
+from ico3d.rig.rig import Rig
 from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.bodies.tiny_training import job, trainer_of
 from support.bodies.tracked_capture import TrackedCapture
@@ -62,7 +65,17 @@ def test_more_gaussians_begin_where_pictures_are_finer(tmp_path):
     capture.cameras = (*near, *capture.cameras[3:])
     finer = _above(trainer_of(capture, "skinned", window=CLIP))
     # Their square is 4 · 1 + 3 · 16 of 7 · 1 where all of it is seen: 2.7 times as fine.
-    assert 1.5 < (finer / (1 - finer)) / (even / (1 - even)) < 3.2
+    assert 2.4 < (finer / (1 - finer)) / (even / (1 - even)) < 2.7**DENSER + 0.6
+
+
+def test_more_gaussians_begin_where_bones_are_short():
+    names, parents = ("root", "arm", "hand", "finger", "tip"), (-1, 0, 1, 2, 3)
+    joints = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.5, 0, 0], [0.56, 0, 0], [0.58, 0, 0]])
+    rig = Rig(names, parents, joints)  # bones of 20, 30, 6, 2 and, to its end, 2 cm
+    weights = np.eye(5, dtype=np.float32)[[0, 1, 2, 3, 4]]
+    half = np.array([[0, 0.5, 0.5, 0, 0]], np.float32)
+    found = detail(Binding.strongest(np.concatenate([weights, half])), rig)
+    assert found == pytest.approx([1, 1, SHORT / 0.06, MOST_DENSE, MOST_DENSE, 7 / 6])
 
 
 def _above(trainer) -> float:

@@ -13,7 +13,7 @@ from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture.clothes.clothed import STEEPEST, tilted
 from ico3d.studio.picture.clothes.knitwear import jumper
-from ico3d.studio.picture.clothes.relief import ROW, STITCH, Weave, folds, knit_height, stitch
+from ico3d.studio.picture.clothes.relief import RAISED, ROW, WALE, Weave, folds, knit_height, stitch
 from support.recordings import synthetic_bodies
 
 RINGS, SIDES, RADIUS = 30, 16, 0.05
@@ -104,22 +104,26 @@ def test_folds_are_as_deep_as_asked_and_none_where_none_are():
 
 def test_knitwear_repeats():
     for u, v in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 2)):
-        assert stitch(u + STITCH, v) == pytest.approx(stitch(u, v), abs=1e-9)
-        assert stitch(u, v + ROW) == pytest.approx(stitch(u, v), abs=1e-5)
+        assert stitch(u + WALE, v, 1e-4) == pytest.approx(stitch(u, v, 1e-4), abs=1e-9)
+        assert stitch(u, v + ROW, 1e-4) == pytest.approx(stitch(u, v, 1e-4), abs=1e-5)
+    assert stitch(0.0, 0.0, 1e-4) == pytest.approx(0, abs=1e-9)  # the valley between two columns
 
 
-@pytest.mark.parametrize("pixel", [0.0008, 0.002])
-def test_a_plain_jumper_has_one_colour_and_no_cables(pixel):
+@pytest.mark.parametrize("pixel", [0.0008, 0.002, 0.006])
+def test_a_plain_jumper_has_one_colour_and_is_as_bright_from_near_as_from_far(pixel):
     wool = SimpleNamespace(jumper=(0.05, 0.13, 0.15))
     middle = Weave(0.0, 0.0, 0.0, 0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 9.0, 0.0)
     colours, heights = [], []
-    for u, v, z in np.random.default_rng(2).uniform(-0.12, 0.12, (400, 3)).tolist():
+    for u, v, z in np.random.default_rng(2).uniform(-0.12, 0.12, (4000, 3)).tolist():
         w = middle._replace(u=u, v=v)
         heights.append(knit_height(w, pixel))
         colours.append(jumper(wool, w, heights[-1], u, v, z, pixel)[:3])
     tones = np.array(colours) / wool.jumper
     np.testing.assert_allclose(tones, tones[:, :1] * np.ones(3), rtol=1e-9)
-    assert np.ptp(tones) < 0.12 and np.ptp(heights) < 0.0003
+    assert tones.mean() == pytest.approx(1, abs=0.015)
+    assert min(heights) >= 0 and max(heights) <= RAISED
+    fine = pixel == 0.006  # a column of stitches is as wide as two such pixels
+    assert (np.ptp(tones) < 0.08) == fine and (np.ptp(heights) < 0.0002) == fine
 
 
 def test_folds_fade_where_their_pattern_is_squeezed():

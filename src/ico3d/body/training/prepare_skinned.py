@@ -21,11 +21,17 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import train_cameras
 from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.errors import CaptureError
+from ico3d.rig.binding import Binding
 from ico3d.rig.body_track import BodyTrack
+from ico3d.rig.rig import Rig
 from ico3d.splat.initial import spacing
 
 SPARE = 3
 """Factor by which more points are drawn than wanted, as those that no camera sees are left out."""
+DENSER, SHORT, MOST_DENSE = 1.5, 0.08, 3.0
+"""Points per area grow with this power of the pixels per metre of the pictures, and with the
+inverse of the length of a bone where that is shorter than `SHORT` metres, up to a factor. Jeans
+that are seen from afar had four tenths of all Gaussians, hands a twelfth."""
 SURFACE = 10_000
 """Points of the recorded surface, among which those off the skin are looked for."""
 
@@ -144,13 +150,27 @@ def _dressed(
 ) -> Skin:
     """`count` points of the skin and of what stands off it, in proportion to their surfaces.
 
-    Those of the skin are the denser the finer (P,) pictures show it.
+    Those of the skin are the denser the finer (P,) pictures show it, and the shorter its bones are.
     """
     frame, others = window.center, sorted({window.first, window.last})
     start = initial_points(capture, frame, SURFACE, rng, settings.initial.source)
     off = standing_off(skin, track, capture, start.points, frame, others)
     beside = min(round(count * len(off) / SURFACE), len(off))
-    return Skin.joined(_some(off, beside, rng), _some(skin, count - beside, rng, fine))
+    dense = fine**DENSER * detail(skin.binding, track.rig)
+    return Skin.joined(_some(off, beside, rng), _some(skin, count - beside, rng, dense))
+
+
+def detail(binding: Binding, rig: Rig) -> np.ndarray:
+    """(P,) how much denser points are where bones are short, as those of fingers."""
+    parents = np.array(rig.parents)
+    below = np.flatnonzero(parents >= 0)
+    length = np.linalg.norm(rig.joints[below] - rig.joints[parents[below]], axis=1)
+    longest = np.zeros(len(rig))
+    np.maximum.at(longest, parents[below], length)
+    ends = np.setdiff1d(below, parents)  # those that carry no other bone
+    longest[ends] = length[np.searchsorted(below, ends)]
+    factor = np.clip(SHORT / np.maximum(longest, 1e-6), 1, MOST_DENSE)  # (J,)
+    return (factor[binding.joints] * binding.weights).sum(1) / binding.weights.sum(1)
 
 
 def _some(

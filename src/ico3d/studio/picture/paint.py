@@ -9,6 +9,7 @@ from ico3d.studio.person.growing.tied import parting
 from ico3d.studio.person.hair import strand_frames
 from ico3d.studio.person.subject import Subject
 from ico3d.studio.person.traits.beard import beard_share, bump
+from ico3d.studio.picture.hands import Hands, hands_of
 from ico3d.studio.picture.occlusion import Sky
 
 OPENINGS = (0.0, 0.12, 0.25, 0.45)
@@ -31,17 +32,19 @@ class Paint:
     """Values per vertex that textures and shading need.
 
     Attributes:
-        channels: (V, 6) float32: lip, redness, freckles, beard, scalp, each 0 to 1 (redness is
-            below 0 where skin is sallow), and the depth behind the lips in metres.
+        channels: (V, 7) float32: lip, redness, freckles, beard, scalp, each 0 to 1 (redness is
+            below 0 where skin is sallow), the depth behind the lips in metres, and hand, 0 to 1.
         strands: (V, 4) float32, as `strand_frames` returns them.
         openings: (O,) float32 gap of the inner lips in metres for each of `OPENINGS`, ascending.
         occlusion: (O, V) float32 visible share of the sky for each of `OPENINGS`.
+        hands: The lines and nails of the hands.
     """
 
     channels: np.ndarray
     strands: np.ndarray
     openings: np.ndarray
     occlusion: np.ndarray
+    hands: Hands
 
     def occlusion_at(self, gap: float) -> np.ndarray:
         """(V,) float32 visible share of the sky for a gap of the inner lips in metres."""
@@ -62,8 +65,13 @@ def paint(subject: Subject) -> Paint:
         vertices = subject.posed(subject.weights(shape))
         gaps.append(lip_gap(subject.landmarks(vertices)))
         occlusion.append(head.visible(vertices))
+    hands = hands_of(subject)
     return Paint(
-        _channels(subject), strand_frames(subject), np.array(gaps, np.float32), np.stack(occlusion)
+        _channels(subject, hands),
+        strand_frames(subject),
+        np.array(gaps, np.float32),
+        np.stack(occlusion),
+        hands,
     )
 
 
@@ -72,7 +80,7 @@ def lip_gap(landmarks: np.ndarray) -> float:
     return float(np.linalg.norm(landmarks[62] - landmarks[66]))
 
 
-def _channels(subject: Subject) -> np.ndarray:
+def _channels(subject: Subject, hands: Hands) -> np.ndarray:
     vertices, marks = subject.vertices, subject.landmarks(subject.vertices)
     width = float(np.linalg.norm(marks[16] - marks[0]))  # of the face, about 0.13 m
     eyes = [eye.centre for eye in subject.eyes]
@@ -99,11 +107,12 @@ def _channels(subject: Subject) -> np.ndarray:
     return np.stack(
         [
             subject.lip_mask,
-            np.clip(redness, -1, 1),
+            np.clip(redness + hands.redness, -1, 1),
             np.clip(freckles, 0, 1),
             beard_share(vertices, marks) * (1 - subject.lip_mask),
             _scalp(subject),
             np.maximum(marks[[62, 66], 2].mean() - vertices[:, 2], 0),
+            hands.share,
         ],
         axis=1,
     ).astype(np.float32)

@@ -12,7 +12,7 @@ from ico3d.studio.picture.clothes import garments, knitwear
 from ico3d.studio.picture.clothes.clothed import clothed
 from ico3d.studio.picture.eyeball import shaded_eye
 from ico3d.studio.picture.lighting import LOOKED_UP, lit, seen_lamp
-from ico3d.studio.picture.skin import lit_skin, relieved, skin_at
+from ico3d.studio.picture.skin import handed, lit_skin, relieved, skin_at
 from ico3d.studio.picture.textures import noise, strands
 from ico3d.studio.raster import weights_at
 
@@ -41,7 +41,7 @@ class Scene(NamedTuple):
         rest: (V, 3) float32 neutral vertices, at which textures are evaluated, metres.
         vertices: (V, 3) float32 posed vertices, canonical head space, metres.
         normals: (V, 3) float32.
-        channels: (V, 6) float32 `Paint.channels`.
+        channels: (V, 7) float32 `Paint.channels`.
         strands: (V, 4) float32 `Paint.strands`.
         occlusion: (V,) float32 `Paint.occlusion_at` of this frame.
         lamps: (V, 2) float32 shares of key and rim light that clothes see; below 0 if they are
@@ -49,6 +49,8 @@ class Scene(NamedTuple):
         fields: (V, 8) float32 `Tailored.fields`.
         folds: (V,) float32 `Tailored.folds` of this frame.
         eyes: (2, 25) float32 `eye_rows` of this frame.
+        lines: (2, K, 8) float32 `Hands.lines`.
+        nails: (2, 5, 7) float32 `Hands.nails`.
     """
 
     faces: np.ndarray
@@ -64,6 +66,8 @@ class Scene(NamedTuple):
     fields: np.ndarray
     folds: np.ndarray
     eyes: np.ndarray
+    lines: np.ndarray
+    nails: np.ndarray
 
 
 @subroutine(fast=False)
@@ -107,7 +111,7 @@ def _strand(scene, f, a, b, c):
 
 @subroutine(fast=False)
 def _painted(scene, f, a, b, c):
-    """The six channels of `Paint` at a spot."""
+    """The channels of `Paint` at a spot."""
     i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
     ch = scene.channels
     return (
@@ -117,6 +121,7 @@ def _painted(scene, f, a, b, c):
         a * ch[i, 3] + b * ch[j, 3] + c * ch[k, 3],
         a * ch[i, 4] + b * ch[j, 4] + c * ch[k, 4],
         a * ch[i, 5] + b * ch[j, 5] + c * ch[k, 5],
+        a * ch[i, 6] + b * ch[j, 6] + c * ch[k, 6],
     )
 
 
@@ -194,6 +199,10 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
         wide = pixel / max(0.3, n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
         n, hollow = relieved(n, values[0], rest[0], rest[1], rest[2], wide)
         skin = skin_at(colors, values, rest[0], rest[1], rest[2], wide)
+        if values[6] > 0.1:
+            side = 0 if rest[0] > 0.0 else 1
+            skin, open_ = handed(skin, scene.lines[side], scene.nails[side], rest, wide)
+            hollow *= open_
         return lit_skin(skin, lights, n, v, p, smooth, occlusion * hollow)
     if material == HAIR:
         tx, ty, tz, per_metre = _strand(scene, f, a, b, c)

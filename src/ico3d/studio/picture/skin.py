@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from ico3d.splat.cpu.compile import subroutine
+from ico3d.studio.picture.hands import line_depth, nail_share
 from ico3d.studio.picture.lighting import ambient, diffuse, highlight, seen_lamp, unoccluded
 from ico3d.studio.picture.textures import grain, noise, slope, smoothstep, spots, visible
 
@@ -42,7 +43,7 @@ class Skin(NamedTuple):
 @subroutine()
 def skin_at(colors, channels, x, y, z, pixel):
     """The `Skin` of a face at a place at rest: flush, freckles, veins, beard, roots, lips."""
-    lip, red, freckle, beard, scalp, _ = channels
+    lip, red, freckle, beard, scalp = channels[:5]
     large, small = grain(x, y, z, 0.024, pixel), grain(x + 2.0, y, z, 0.007, pixel)
     fine = grain(x, y, z, 0.0021, pixel)
     # Melanin darkens all, blue most; blood takes green and blue.
@@ -82,6 +83,39 @@ def skin_at(colors, channels, x, y, z, pixel):
         0.54 + 0.04 * small - 0.10 * edge,
         oil + (0.55 - oil) * edge,
         (0.9 + 0.35 * edge + 0.10 * fine) * (1.0 - 0.9 * roots),
+    )
+
+
+@subroutine()
+def handed(skin, lines, nails, rest, pixel):
+    """The `Skin` of a hand with its lines and nails, and how much of the light gets into lines."""
+    x, y, z = rest
+    nail, away = nail_share(nails, x, y, z, pixel)
+    if nail > 0.0:
+        # A pale edge of keratin, pink flesh under the rest of it.
+        pale = 0.10 * smoothstep(0.7, 1.0, away)
+        return (
+            Skin(
+                skin.red * (1.0 + nail * (0.04 + pale)),
+                skin.green * (1.0 + nail * (pale - 0.06)),
+                skin.blue * (1.0 + nail * (pale - 0.03)),
+                skin.roughness * (1.0 - 0.45 * nail),
+                skin.oil + (0.8 - skin.oil) * nail,
+                skin.gloss * (1.0 + 0.5 * nail),
+            ),
+            1.0 - 0.25 * nail * smoothstep(0.85, 1.0, away),
+        )
+    depth = line_depth(lines, x, y, z, pixel)
+    return (
+        Skin(
+            skin.red * (1.0 - 0.20 * depth),
+            skin.green * (1.0 - 0.38 * depth),
+            skin.blue * (1.0 - 0.40 * depth),
+            skin.roughness,
+            skin.oil * (1.0 - depth),
+            skin.gloss * (1.0 - 0.5 * depth),
+        ),
+        1.0 - 0.35 * depth,
     )
 
 
@@ -133,7 +167,9 @@ def lit_skin(skin, lights, n, v, p, smooth, occlusion):
     """
     facing = max(0.0, n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
     ar, ag, ab = ambient(lights, smooth)
-    r = skin.red * ar * unoccluded(occlusion**0.8, skin.red)
+    # Where hardly any light comes in, none has a way on: deep in a cuff skin is dark, not red.
+    through = 0.2 * smoothstep(0.1, 0.5, occlusion)
+    r = skin.red * ar * unoccluded(occlusion ** (1.0 - through), skin.red)
     g = skin.green * ag * unoccluded(occlusion, skin.green)
     b = skin.blue * ab * unoccluded(occlusion, skin.blue)
     f0 = FACING * skin.gloss

@@ -3,13 +3,13 @@
 import math
 
 from ico3d.splat.cpu.compile import subroutine
-from ico3d.studio.picture.clothes.relief import RIBBED, ROW, TWILL, ribbed, stitch, twill
+from ico3d.studio.picture.clothes.relief import RIBBED, TWILL, WALE, ribbed, stitch, twill
 from ico3d.studio.picture.materials import Spot
 from ico3d.studio.picture.textures import grain, noise, smoothstep, visible
 
 THREAD = (0.42, 0.235, 0.085)
 """Albedo of the stitches on jeans."""
-BETWEEN, MEAN_STITCH = 0.16, 0.41
+BETWEEN, MEAN_STITCH = 0.42, 0.52
 """How much darker wool is between stitches, and the mean height of a stitch, 0 to 1."""
 FUZZ = 0.22
 """Light that the hairs of wool send back at grazing angles."""
@@ -31,9 +31,9 @@ def jumper(colors, w, height, x, y, z, pixel):
     # Wool is never quite even: broad, faint clouds, too soft to look like a pattern.
     tone = 1.0 + 0.03 * grain(x, 0.6 * y, z, 0.05, pixel)
     rib = ribbed(w)
-    seen = visible(ROW, 2.8 * pixel) * (1.0 - rib)
+    seen = visible(WALE, 1.8 * pixel) * (1.0 - rib)
     # Stitches keep the mean tone: wool is as bright from far away as from near.
-    tone *= 1.0 - seen * BETWEEN * (MEAN_STITCH - stitch(w.u, w.v))
+    tone *= 1.0 - seen * BETWEEN * (MEAN_STITCH - stitch(w.u, w.v, pixel))
     if rib > 0.0:
         tone *= 1.0 - rib * 0.16 * (1.0 - smoothstep(-0.0005, 0.9 * RIBBED, height))
     base = colors.jumper

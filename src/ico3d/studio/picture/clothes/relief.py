@@ -11,10 +11,13 @@ from typing import NamedTuple
 from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.studio.picture.textures import smoothstep, visible
 
-STITCH, ROW = 0.0036, 0.0028
-"""Width and height of a stitch of fine knitwear, metres."""
-RAISED, RIBBED = 0.00020, 0.0013
-"""Height of a stitch and of a rib, metres."""
+WALE, ROW = 0.0115, 0.0048
+"""Width of a column of stitches with the valley beside it, and height of a stitch, metres.
+
+Wool this thick is seen as knitted from as far away as a page shows a person.
+"""
+RAISED, RIBBED = 0.0013, 0.0013
+"""Height of a column of stitches and of a rib at an edge, metres."""
 TWILL = 0.0021
 """Distance between two diagonal lines of denim, metres."""
 
@@ -101,19 +104,19 @@ def knit_height(w, pixel):
         height += rib * RIBBED * visible(0.0075, 1.8 * pixel) * round_ * (2.0 - round_)
         height -= 0.0012 * rib * smoothstep(0.8, 1.0, w.hem)
         height += 0.0020 * (1.0 - smoothstep(0.0, 0.12, w.hem))
-    fine = visible(ROW, 2.8 * pixel)
-    if rib < 1.0 and fine > 0.0:
-        height += (1.0 - rib) * RAISED * fine * stitch(w.u, w.v)
+    if rib < 1.0:
+        height += (1.0 - rib) * RAISED * visible(WALE, 1.8 * pixel) * stitch(w.u, w.v, pixel)
     return height - 0.0005 * (1.0 - smoothstep(0.0, 0.006, w.seam))
 
 
 @kernel()
-def stitch(u, v):
-    """Stitches that lean towards one another in columns, 0 to 1."""
-    column = u / STITCH - math.floor(u / STITCH) - 0.5
-    leg = 4.0 * (abs(column) - 0.25)
-    phase = 6.2832 * (v / ROW - 1.15 * abs(column))
-    return max(0.0, 1.0 - leg * leg) * (0.62 + 0.38 * math.cos(phase))
+def stitch(u, v, pixel):
+    """Height of round columns of stitches that lean towards one another, 0 to 1."""
+    column = u / WALE - math.floor(u / WALE) - 0.5
+    round_ = 0.5 + 0.5 * math.cos(6.2832 * column)
+    phase = 6.2832 * (v / ROW - 2.0 * abs(column))
+    row = 0.17 * visible(ROW, 2.4 * pixel) * math.cos(phase)
+    return round_ * (2.0 - round_) * (0.83 + row)
 
 
 @subroutine()
