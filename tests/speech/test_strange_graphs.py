@@ -8,6 +8,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.errors import ModelError
+from ico3d.speech import runtime
 from ico3d.speech.runtime import SpeechModel
 
 pytestmark = pytest.mark.slow
@@ -68,3 +69,29 @@ def test_the_values_of_a_long_sound_are_computed_piece_by_piece(monkeypatch):
     )
     assert len(model.expressions(np.zeros(90 * 16_000, np.float32), 16_000)) == 2251
     assert max(rows) < 1000
+
+
+def test_a_run_that_takes_too_long_ends_amid_the_graph():
+    nodes = [helper.make_node("Concat", ["flat"] * TIMES, ["y0"], axis=1)]
+    for step in range(300):
+        nodes.append(helper.make_node("Tanh", [f"y{step}"], [f"y{step + 1}"]))
+    nodes.append(helper.make_node("Identity", ["y300"], ["x0"]))
+    session = runtime._session(graph(nodes, 0), "it", bounded=True)
+    mel = np.ones((100, 80, 16), np.float32)
+    begun = time.process_time()
+    with pytest.raises(Exception, match="terminate"):
+        runtime._within(0.2, session, {"mel": mel})
+    assert time.process_time() - begun < 1
+    assert runtime._within(60.0, session, {"mel": mel[:1]}).shape == (1, 32)
+
+
+def test_a_graph_that_takes_too_long_in_silence_is_refused(monkeypatch):
+    monkeypatch.setattr(runtime, "MOST_SECONDS", -1.0)  # over before it begins
+    with pytest.raises(ModelError, match=r"cannot be run within 1024 MiB and -1 s: "):
+        SpeechModel(graph(repeated(), 1))
+
+
+def test_a_stranger_s_bytes_are_read_as_onnx_alone():
+    """At the fifth byte the runtime's other format has its name."""
+    with pytest.raises(ModelError, match="protobuf parsing failed"):
+        SpeechModel(b"\x32\x10\0\0ORTM" + bytes(80))

@@ -1,20 +1,14 @@
 """Checks `speech.onnx` before a runtime loads it: standard operators, weights inside.
 
 The check reads protobuf's wire format directly, so that a server needs no onnx package. Field
-numbers are those of onnx.proto (ModelProto, GraphProto, NodeProto, AttributeProto, TensorProto).
+numbers are those of onnx.proto.
 """
 
-import itertools
-from collections.abc import Iterator
+import math
 
+from ico3d.common.unpacking.protobuf import Form, Message, Reader, RefusedFieldError
 from ico3d.errors import BundleError
 
-_GRAPH, _FUNCTIONS = 7, 25
-_NODE, _INITIALIZER, _SPARSE, _INPUT, _OUTPUT = 1, 5, 15, 11, 12
-_OP_TYPE, _ATTRIBUTE, _DOMAIN = 4, 5, 7
-_TENSOR, _SUBGRAPHS = 5, (6, 11)
-_EXTERNAL, _LOCATION = 13, 14
-_NAME, _TENSOR_NAME = 1, 8
 OPERATORS = {
     "Add",
     "Cast",
@@ -40,15 +34,68 @@ OPERATORS = {
 There are no loops and no random numbers among them.
 """
 
-Value = int | memoryview
-Count = Iterator[int]
 MOST_FIELDS = 100_000
-"""Fields that are looked at, some ten for each operator of a graph and five for each weight: empty
-ones have two bytes, and a runtime takes 30 kB for each operator."""
-
+"""Fields that are read, some ten for each operator of a graph and five for each weight."""
+MOST_TEXT = 1 << 20
+"""Bytes of names and notes."""
+MOST_OPERATORS = 5_000
+"""A runtime takes 30 kB for each of them."""
+MOST_DIMENSIONS, MOST_SIZE = 8, 1 << 31
+"""Dimensions of weights and inputs, and how large one may be."""
+MOST_SETTING = 1 << 20
+"""How large whole numbers among the attributes of operators may be, such as strides and pads."""
 
 OPTIONAL_INPUT = "told"
 """Input that a model may have besides its own, with a value for when it is not given."""
+
+_OTHER_FORMAT = b"ORTM"
+"""At the fifth byte, by which runtimes know models of a format that nobody checks here."""
+_ELSEWHERE, _NESTED = "keeps weights in another file", "holds a graph within a graph"
+_DOMAINS = ("", "ai.onnx")
+_WIDTHS = {1: 4, 6: 4, 7: 8, 9: 1, 10: 2, 11: 8}
+"""Bytes of a number by its type: float32, int32, int64, bool, float16, float64."""
+_VALUES = {1: 2, 2: 3, 3: 4, 4: 5, 6: 7, 7: 8}
+"""The field that holds an attribute's value, by the attribute's type."""
+
+_FLOAT = 1
+_SHAPED = {"Pad", "ReduceSum", "Slice", "Unsqueeze"}
+"""Operators whose inputs behind the first say which shape comes out."""
+
+_TENSOR = Form(
+    "weights",
+    once={2: "number", 8: "text", 9: "bytes", 12: "text", 14: "number"},
+    many={1: "number"},
+    refused={13: _ELSEWHERE},
+)
+_ATTRIBUTE = Form(
+    "attribute",
+    once={1: "text", 2: "float", 3: "number", 4: "text", 5: _TENSOR, 13: "text", 20: "number"},
+    many={7: "float", 8: "number"},
+    refused={6: _NESTED, 11: _NESTED, 22: "has sparse weights", 23: "has sparse weights"},
+)
+_NODE = Form(
+    "operator",
+    once={3: "text", 4: "text", 6: "text", 7: "text"},
+    many={1: "text", 2: "text", 5: _ATTRIBUTE},
+)
+_DIMENSION = Form("dimension", once={1: "number", 2: "text"})
+_SHAPE = Form("shape", many={1: _DIMENSION})
+_ARRAY = Form("array", once={1: "number", 2: _SHAPE})
+_TYPE = Form("type", once={1: _ARRAY})
+_PORT = Form("input or output", once={1: "text", 2: _TYPE, 3: "text"})
+_GRAPH = Form(
+    "graph",
+    once={2: "text", 10: "text"},
+    many={1: _NODE, 5: _TENSOR, 11: _PORT, 12: _PORT},
+    refused={15: "has sparse weights"},
+)
+_OPERATOR_SET = Form("operator set", once={1: "text", 2: "number"})
+_MODEL = Form(
+    "model",
+    once={1: "number", 2: "text", 3: "text", 4: "text", 5: "number", 6: "text", 7: _GRAPH},
+    many={8: _OPERATOR_SET},
+    refused={25: "defines functions of its own"},
+)
 
 
 def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> None:
@@ -63,113 +110,92 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
 
     Raises:
         BundleError: If the data are no ONNX model, the model uses operators that are not allowed,
-            or it refers to other files.
+            it refers to other files, or it holds anything that such a model has no use for.
     """
     try:
-        count = itertools.count()
-        graphs: list[memoryview] = []
-        for field, value in _fields(memoryview(data), count):
-            if field == _FUNCTIONS:
-                raise BundleError(f"{name}: defines functions of its own.")
-            if field == _GRAPH:
-                graphs.append(_bytes(value))
-        if len(graphs) != 1:
+        if data[4:8] == _OTHER_FORMAT:
+            raise ValueError("another format")
+        model = Reader(MOST_FIELDS, MOST_TEXT).read(memoryview(data), _MODEL)
+        if any(used.one(1, "") not in _DOMAINS for used in model.all(8)):
+            raise RefusedFieldError("uses operators that are no standard ones")
+        graph = model.one(7, None)
+        if graph is None:
             raise ValueError("no graph")
-        _check_graph(graphs[0], count, name, input_name, output_name)
+        _check_graph(graph)
+        _check_ports(graph, input_name, output_name)
+    except RefusedFieldError as error:
+        raise BundleError(f"{name}: {error}.") from error
     except (ValueError, IndexError) as error:
         raise BundleError(f"{name}: is not an ONNX model.") from error
 
 
-def _check_graph(
-    graph: memoryview, count: Count, name: str, input_name: str, output_name: str
-) -> None:
-    names: dict[int, list[str]] = {_INPUT: [], _OUTPUT: []}
-    weights: set[str] = set()
-    for field, value in _fields(graph, count):
-        if field == _NODE:
-            _check_node(_bytes(value), count, name)
-        elif field == _INITIALIZER:
-            _check_tensor(_bytes(value), count, name)
-            weights.add(_text(_bytes(value), count, _TENSOR_NAME))
-        elif field == _SPARSE:
-            raise BundleError(f"{name}: has sparse weights.")
-        elif field in names:
-            names[field].append(_text(_bytes(value), count, _NAME))
-    if OPTIONAL_INPUT in weights and names[_INPUT][1:] == [OPTIONAL_INPUT]:
-        del names[_INPUT][1]
-    if names != {_INPUT: [input_name], _OUTPUT: [output_name]}:
-        raise BundleError(f"{name}: must lead from '{input_name}' to '{output_name}'.")
+def _check_graph(graph: Message) -> None:
+    if len(graph.all(1)) > MOST_OPERATORS:
+        raise RefusedFieldError(f"has more than {MOST_OPERATORS:,} operators")
+    fixed = _fixed(graph)
+    for node in graph.all(1):
+        _check_node(node)
+        if node.one(4, "") in _SHAPED and not fixed.issuperset(node.all(1)[1:]):
+            raise RefusedFieldError("makes its shapes of what it hears")
+    for weights in graph.all(5):
+        _check_tensor(weights)
+    for port in (*graph.all(11), *graph.all(12)):
+        array = port.one(2, Message({})).one(1, Message({}))
+        dimensions = array.one(2, Message({})).all(1)
+        _check_dimensions([dimension.one(1, 1) for dimension in dimensions])
+        if array.one(1, 0) != _FLOAT:
+            raise RefusedFieldError("must lead from float32 to float32")
 
 
-def _check_node(node: memoryview, count: Count, name: str) -> None:
-    operator = _text(node, count, _OP_TYPE)
-    if _text(node, count, _DOMAIN) not in ("", "ai.onnx") or operator not in OPERATORS:
-        raise BundleError(f"{name}: uses the operator {operator[:40]!r}.")
-    for field, value in _fields(node, count):
-        if field == _ATTRIBUTE:
-            for inner, part in _fields(_bytes(value), count):
-                if inner in _SUBGRAPHS:
-                    raise BundleError(f"{name}: holds a graph within a graph.")
-                if inner == _TENSOR:
-                    _check_tensor(_bytes(part), count, name)
+def _fixed(graph: Message) -> set[str]:
+    """Names of what is the same whatever is heard, and of inputs that are left out.
 
-
-def _check_tensor(tensor: memoryview, count: Count, name: str) -> None:
-    for field, value in _fields(tensor, count):
-        if field == _EXTERNAL or (field == _LOCATION and value):
-            raise BundleError(f"{name}: keeps weights in another file.")
-
-
-def _text(message: memoryview, count: Count, wanted: int) -> str:
-    """The last string in a field, which is the one that counts; empty where there is none."""
-    found = b""
-    for field, value in _fields(message, count):
-        if field == wanted:
-            found = _bytes(value)
-    return bytes(found).decode()
-
-
-def _fields(message: memoryview, count: Count) -> Iterator[tuple[int, Value]]:
-    """The (field number, value) pairs of a message; 32- and 64-bit numbers stay bytes.
-
-    Raises:
-        ValueError: If the message is damaged, or it is one field too many of the model.
+    A graph whose shapes depend on what it hears could be cheap in silence, in which it is tried.
     """
-    position = 0
-    while position < len(message):
-        if next(count) >= MOST_FIELDS:
-            raise ValueError("too many fields")
-        key, position = _varint(message, position)
-        kind = key & 7
-        if kind == 0:
-            value, position = _varint(message, position)
-            yield key >> 3, value
-            continue
-        if kind == 2:
-            length, position = _varint(message, position)
-        elif kind in (1, 5):
-            length = 8 if kind == 1 else 4
-        else:
-            raise ValueError("no such wire type")
-        if position + length > len(message):
-            raise ValueError("cut off")
-        yield key >> 3, message[position : position + length]
-        position += length
+    constants, others = set[str](), {port.one(1, "") for port in graph.all(11)}
+    for node in graph.all(1):
+        (constants if node.one(4, "") == "Constant" else others).update(node.all(2))
+    return ({tensor.one(8, "") for tensor in graph.all(5)} | constants | {""}) - others
 
 
-def _varint(message: memoryview, position: int) -> tuple[int, int]:
-    """A number of up to ten bytes and the position behind it."""
-    value = 0
-    for shift in range(0, 70, 7):
-        byte = message[position]
-        position += 1
-        value |= (byte & 0x7F) << shift
-        if byte < 0x80:
-            return value, position
-    raise ValueError("number too long")
+def _check_ports(graph: Message, input_name: str, output_name: str) -> None:
+    inputs, outputs = ([port.one(1, "") for port in graph.all(side)] for side in (11, 12))
+    weights = {tensor.one(8, "") for tensor in graph.all(5)}
+    if OPTIONAL_INPUT in weights and inputs[1:] == [OPTIONAL_INPUT]:
+        del inputs[1]
+    if (inputs, outputs) != ([input_name], [output_name]):
+        raise RefusedFieldError(f"must lead from '{input_name}' to '{output_name}'")
 
 
-def _bytes(value: Value) -> memoryview:
-    if isinstance(value, int):
-        raise ValueError("a number where a message was expected")
-    return value
+def _check_node(node: Message) -> None:
+    operator = node.one(4, "")
+    if node.one(7, "") not in _DOMAINS or operator not in OPERATORS:
+        raise RefusedFieldError(f"uses the operator {operator[:40]!r}")
+    for attribute in node.all(5):
+        if set(attribute.fields) - {1, 13, 20} - {_VALUES.get(attribute.one(20, 0))}:
+            raise ValueError("an attribute of another type than it says")
+        for tensor in attribute.all(5):
+            _check_tensor(tensor)
+        numbers = [*attribute.all(3), *attribute.all(8)]
+        if operator != "Constant" and any(abs(_signed(n)) > MOST_SETTING for n in numbers):
+            raise ValueError("an attribute too large")
+
+
+def _check_tensor(tensor: Message) -> None:
+    """A tensor must store all numbers that it claims, in itself and as they are in memory."""
+    if tensor.one(14, 0):
+        raise RefusedFieldError(_ELSEWHERE)
+    sizes, width = tensor.all(1), _WIDTHS.get(tensor.one(2, 0))
+    _check_dimensions(sizes)
+    if width is None or math.prod(sizes) * width != len(tensor.one(9, b"")):
+        raise ValueError("weights of another size than they claim")
+
+
+def _check_dimensions(sizes: list[int]) -> None:
+    if len(sizes) > MOST_DIMENSIONS or not all(1 <= size < MOST_SIZE for size in sizes):
+        raise ValueError("too many or too large dimensions")
+
+
+def _signed(number: int) -> int:
+    """What 64 bits stand for in two's complement."""
+    return number - (1 << 64) if number >> 63 else number

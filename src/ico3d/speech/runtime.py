@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
+from threading import Timer
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,13 +15,14 @@ from ico3d.common.expression import SPEECH_SIZE
 from ico3d.common.weights import find_model, model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, ModelError
 from ico3d.speech.blocks import BlockStream
-from ico3d.speech.mel import RATE
+from ico3d.speech.mel import FPS, RATE
 from ico3d.speech.phonemes import TimedPhonemes
 from ico3d.speech.silence import SilenceGate
 from ico3d.speech.stream import WindowStream
 
 _LARGE = 10**8  # bytes
 MOST_MEMORY = 1 << 30  # bytes that the graphs of bundles may take while they run, all together
+MOST_SECONDS = 5.0  # that a run of a bundle's graph may take longer than its sound lasts
 AT_ONCE = 30.0  # s of a whole sound, whose rows are computed together
 
 BEFORE, AFTER = 4, 3  # rows that the attention sees around each: [i − 4, i + 4)
@@ -102,11 +104,14 @@ class SpeechModel:
         Args:
             rows: What is heard.
             told: (T, 6) what is known of the articulation (`TimedPhonemes.rows`); None for nothing.
+
+        Raises:
+            Exception: If the graph cannot be run, or takes too long.
         """
         given = {self._input: rows}
         if told is not None and self.takes_phonemes:
             given[TOLD] = told
-        return self._model.run(None, given)[0]
+        return _within(MOST_SECONDS + len(rows) / FPS, self._model, given)
 
     def _tried(self, rows: np.ndarray) -> np.ndarray:
         """The first run, which shows whether a stranger's graph can be run at all."""
@@ -115,7 +120,8 @@ class SpeechModel:
         except Exception as error:  # onnxruntime's have no common class
             why = str(error).strip().rstrip(".")[:200]
             raise ModelError(
-                f"speech.onnx cannot be run within {MOST_MEMORY >> 20} MiB: {why}."
+                f"speech.onnx cannot be run within {MOST_MEMORY >> 20} MiB "
+                f"and {MOST_SECONDS:g} s: {why}."
             ) from None
         if found.shape != (len(rows), SPEECH_SIZE):
             raise ModelError(f"speech.onnx gives {found.shape[-1]} values, not {SPEECH_SIZE}.")
@@ -290,6 +296,23 @@ def served_name(name: str, sha256: str) -> str:
     return f"{name}-{sha256[:12]}.onnx"
 
 
+def _within(seconds: float, session: Any, given: dict[str, np.ndarray]) -> np.ndarray:
+    """The first output of a run, which ends at the next operator when the time is over."""
+    import onnxruntime
+
+    options = onnxruntime.RunOptions()
+    timer = Timer(seconds, setattr, (options, "terminate", True))
+    timer.daemon = True
+    timer.start()
+    try:
+        found = session.run(None, given, options)[0]
+    finally:
+        timer.cancel()
+    if options.terminate:
+        raise TimeoutError(f"it took more than {seconds:g} s")
+    return found
+
+
 def _is_large(file: bytes | Path | str) -> bool:
     """Whether an encoder is of HuBERT's kind: hundreds of megabytes."""
     size = len(file) if isinstance(file, bytes) else Path(file).stat().st_size
@@ -321,6 +344,8 @@ def _session(
     if bounded:
         _bound_memory()
         options.add_session_config_entry("session.use_env_allocators", "1")
+        # bytes that are ONNX and a format of onnxruntime at once are read as what was checked
+        options.add_session_config_entry("session.load_model_format", "ONNX")
     source = model if isinstance(model, bytes) else str(model)
     wanted = ("CUDAExecutionProvider", "CPUExecutionProvider")[0 if heavy else 1 :]
     providers = [name for name in wanted if name in onnxruntime.get_available_providers()]
