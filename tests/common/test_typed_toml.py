@@ -29,8 +29,20 @@ def test_a_key_of_many_parts_is_refused_at_once(tmp_path, part):
         ".".join(["a"] * 2500) + '."=".' + ".".join(["a"] * 2500) + " = 1",
         'x = {a = """\n""", a."=".' + ".".join(["a"] * 5000) + " = 1}",
         "\n".join(f"[x{i}.{'.'.join(['a'] * 99)}]" for i in range(2000)),
+        f"[{'.'.join(['a'] * 2500)}]\n" + "".join(f"k{i} = 1\n" for i in range(2000)),
+        f"['{'.' * 99}'.{'.'.join(['a'] * 900)}]\n" + "".join(f"k{i}.a = 1\n" for i in range(5000)),
+        "".join(f"[k{i:x}{'.a' * 14}]\n" for i in range(8000)),
+        "k=1\n" * 101_000,
     ],
-    ids=["a key that holds a sign", "behind a text of several lines", "many tables"],
+    ids=[
+        "a key that holds a sign",
+        "behind a text of several lines",
+        "many tables",
+        "short keys in a table of many parts",
+        "the same, quoted",
+        "many short tables",
+        "many lines",
+    ],
 )
 def test_keys_of_many_parts_are_refused_however_they_are_written(text):
     with pytest.raises(ValueError, match="keys have too many parts"):
@@ -41,6 +53,19 @@ def test_a_note_of_many_sentences_is_none():
     note = "She likes tea. " * 2000
     assert parse_toml(f'notes = ["{note}"]') == {"notes": [note]}
     assert parse_toml("a.b.c = 1") == {"a": {"b": {"c": 1}}}
+
+
+@pytest.mark.parametrize("sentences", [1, 10, 600])
+def test_a_persona_of_64_kilobytes_of_prose_is_one(sentences):
+    """In lines of one or ten sentences each, or of all of them."""
+    line = "She has lived by the sea for as long as she can think, and swims ... every morning. "
+    lines = ["".join([line] * sentences)] * (64_000 // len(line) // sentences)
+    notes = ",\n".join(f'"{line}"' for line in lines)
+    assert parse_toml(f"[about]\nnotes = [\n{notes},\n]\nage = 4") == {
+        "about": {"notes": lines, "age": 4}
+    }
+    prose = "\n".join(lines)
+    assert parse_toml(f'notes = """\n{prose}"""\n[a.b]\nc.d = 0.5')["notes"] == prose
 
 
 def test_what_is_nested_too_deep_is_no_toml():

@@ -15,9 +15,10 @@ MOST_VALUES = 4_000_000
 """Lists, objects and their entries of a text of JSON: parsed, each takes up to 100 bytes."""
 MOST_TOML = 1 << 20
 """Characters of a text of TOML, which people write."""
-MOST_SQUARED_POINTS = 10_000_000
-"""Squares of the points in each line of TOML, summed: Python's parser takes time and memory by the
-square of the parts of a dotted key. 100 lines of 200 sentences each have four million."""
+MOST_TOML_COST = 10_000_000
+"""Cost of a text of TOML. Python's parser keeps, for each part of a key, the parts of its table
+and its own so far, and tables, which weigh as much as a hundred of them."""
+_PART = 100
 NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
 
 
@@ -341,17 +342,31 @@ def parse_toml(text: str) -> dict[str, Any]:
     """Parses TOML that may be anybody's.
 
     Raises:
-        ValueError: If the text is no TOML, longer than `MOST_TOML`, has lines of more points than
-            `MOST_SQUARED_POINTS`, or is nested too deep.
+        ValueError: If the text is no TOML, longer than `MOST_TOML`, costs more than
+            `MOST_TOML_COST`, or is nested too deep.
     """
     if len(text) > MOST_TOML:
         raise ValueError(f"it has more than {MOST_TOML:,} characters")
-    if sum(line.count(".") ** 2 for line in text.split("\n")) > MOST_SQUARED_POINTS:
+    if _toml_cost(text) > MOST_TOML_COST:
         raise ValueError("keys have too many parts, or lines too many full stops")
     try:
         return tomllib.loads(text)
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
+
+
+def _toml_cost(text: str) -> int:
+    """The most that parsing may cost, whatever is a key, a table or prose in it.
+
+    No key goes on in a second line, so that it has as many points as its line, or fewer; and the
+    table that it is in has no more than any line before.
+    """
+    cost = most = 0
+    for line in text.split("\n"):
+        points = line.count(".")
+        cost += (points + 1) * (most + points + _PART)
+        most = max(most, points)
+    return cost
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
