@@ -23,3 +23,20 @@ def test_a_head_of_many_tensors_or_without_an_end_is_refused(tmp_path):
         for read in (check_head, lambda file: load_bounded(file.read_bytes())):
             with pytest.raises(ValueError, match="larger than those of models"):
                 read(file)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ['{"d\\u0074ype":"U8","shape":[0],"data_offsets":[0,0]}', '["U8",[0],[0,0]]'],
+    ids=["an escaped word", "no words"],
+)
+def test_many_tensors_are_refused_however_their_heads_are_written(entry):
+    """The library reads both as it reads others."""
+
+    def written(count: int) -> bytes:
+        head = "{" + ",".join(f'"{n}":{entry}' for n in range(count)) + "}"
+        return len(head).to_bytes(8, "little") + head.encode()
+
+    assert len(load_bounded(written(3))) == 3
+    with pytest.raises(ValueError, match="larger than those of models"):
+        load_bounded(written(heads.MOST_TENSORS + 1))
