@@ -113,6 +113,7 @@ def test_a_hostile_animation_is_refused(tmp_path, animation):
         ("background.spz", spz(3, degree=3)),
         ("background.spz", struct.pack("<4sIIBBBB", b"NGSP", 4, 5, 0, 12, 0, 6) + b"\0" * 200),
         ("background.ply", ply(1)),
+        ("background.ply", ply(more="element face 0\n")),
         ("background.ply", ply().replace(b"\n", b"\r\n")),
     ],
 )
@@ -147,6 +148,7 @@ def test_backgrounds_that_are_read(name, data):
         ("background.ply", ply(kind="list uchar int"), "declares what no file"),
         ("background.ply", ply(more="element vertex 2\n"), "declares what no file"),
         ("background.ply", ply(kind="complex"), "declares what no file"),
+        ("background.ply", ply(more=f"element rows {10**11}\n"), "rows without columns"),
         ("background.ply", b"ply\n" + b"comment x\n" * 10_000 + ply(), "is not a PLY file"),
     ],
 )

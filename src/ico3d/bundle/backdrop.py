@@ -52,6 +52,8 @@ def _check_ply(data: bytes, name: str) -> None:
     if ["format", "binary_little_endian", "1.0"] not in lines:
         raise BundleError(f"{name}: must be of the format binary_little_endian 1.0.")
     counts, widths = _ply_tables(lines, name)
+    if any(count and not widths[table] for table, count in counts.items()):
+        raise BundleError(f"{name}: its header promises rows without columns.")
     _check_count(counts.get("vertex", 0), name)
     promised = end.end() + sum(count * widths[table] for table, count in counts.items())
     if promised != len(data):
