@@ -6,8 +6,8 @@ import numpy as np
 from safetensors.numpy import load
 
 MOST_HEAD, MOST_TENSORS = 16 << 20, 10_000
-"""Bytes of what a file says of its tensors and of itself, and how many tensors it may have, less one
-for every two brackets in what it says: for each more than a kilobyte of memory is taken."""
+"""Bytes of what a file says of its tensors and of itself, and how many tensors it may have, fewer
+if the latter has brackets: for each more than a kilobyte of memory is taken."""
 SMALL_HEAD = 1 << 20
 """Bytes of a head that is parsed here: what it says becomes thirty times as much."""
 
