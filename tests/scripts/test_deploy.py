@@ -79,6 +79,16 @@ def test_the_unit_runs_a_command_that_there_is():
     assert cli.parsed("serve", words[1:]).name == ("avatar.example.org",)
 
 
+def test_nothing_lies_where_servers_stand():
+    """A runtime may read files beneath the folder in which it runs."""
+    unit = (DEPLOY / "ico3d@.service").read_text()
+    own = re.search(r"^RuntimeDirectory=(.+)$", unit, re.M)[1]
+    assert f"\nWorkingDirectory=%t/{own}\n" in unit
+    image = (DEPLOY / "Dockerfile").read_text().split("\nFROM")[-1]
+    assert re.findall(r"^WORKDIR (.+)$", image, re.M) == ["/var/empty"]
+    assert "/var/empty" not in str(COMPOSE)
+
+
 def test_the_dashboard_shows_figures_that_there_are():
     there = set(re.findall(r"# TYPE (\w+)", Monitor().exposition().decode()))
     board = json.loads((DEPLOY / "monitoring/grafana/dashboard.json").read_text())
