@@ -27,9 +27,9 @@ class Form:
     """
 
     name: str
-    once: "Mapping[int, Kind | Form]" = field(default_factory=dict)
-    many: "Mapping[int, Kind | Form]" = field(default_factory=dict)
-    refused: Mapping[int, str] = field(default_factory=dict)
+    once: "Mapping[int, Kind | Form]" = field(default_factory=dict[int, Any])
+    many: "Mapping[int, Kind | Form]" = field(default_factory=dict[int, Any])
+    refused: Mapping[int, str] = field(default_factory=dict[int, str])
 
 
 class RefusedFieldError(ValueError):
