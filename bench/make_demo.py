@@ -101,8 +101,8 @@ TRAIN_HEAD = (
     "--density.gradient 0.00018 --density.min-contribution 0.15 --displacements 8"
 )
 TRAIN_BODY = (
-    "--steps-per-frame 100 --initial.gaussians 60000 --initial.opacity 0.8 "
-    "--density.max-gaussians 80000 --density.until 0.6 --density.min-opacity 0.05 "
+    "--steps-per-frame 100 --initial.gaussians 64000 --initial.opacity 0.8 "
+    "--density.max-gaussians 84000 --density.until 0.6 --density.min-opacity 0.05 "
     "--rates.position 0.0003 --rates.pose 0.0002 --rates.root 0.0002 --rates.joints 0.00005 "
     "--loss.squares 2 --joining.no-match-colors"
 )

@@ -226,3 +226,10 @@ def test_personas(tmp_path):
         load_persona(path)
     with pytest.raises(BundleError, match=r"nothing\.json"):
         load_persona(tmp_path / "nothing.json")
+
+
+def test_rows_of_a_strip_may_be_of_cameras_of_any_size():
+    wide, narrow = np.zeros((4, 6, 3)), np.full((2, 3, 3), 0.5)
+    found = head_cost.stacked([wide, narrow])
+    assert found.shape == (6, 6, 3) and found.dtype == np.uint8
+    assert (found[:4] == 0).all() and (found[4:, :3] == 128).all() and (found[4:, 3:] == 255).all()

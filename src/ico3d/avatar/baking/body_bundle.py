@@ -241,7 +241,7 @@ def strip(body: MovingBody, baked: BakedBody, capture: Capture | None) -> np.nda
         views = recorded_views(capture, span, count) if capture else probes
         pair = window_pair(body, index, at, None)
         lines += [comparison_line(*pair, view) for view in views]
-    return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+    return head_cost.stacked(lines)
 
 
 def _attempts(

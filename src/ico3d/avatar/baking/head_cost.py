@@ -1,6 +1,6 @@
 """What baking costs a head: PSNR of exact and baked head, to recorded pictures and each other."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -133,7 +133,21 @@ def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
     for view in chosen:
         pictures = [view.exact, baked_picture(head, view)]
         lines.append(np.hstack(pictures if view.truth is None else [view.truth, *pictures]))
-    return (np.vstack(lines).astype(np.float32).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+    return stacked(lines)
+
+
+def stacked(lines: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows of pictures under one another; cameras may differ, so that rows have any size.
+
+    Args:
+        lines: (H_i, W_i, 3) display values.
+
+    Returns:
+        (ΣH, W, 3) uint8, W that of the widest row; beside the others it is white.
+    """
+    width = max(line.shape[1] for line in lines)
+    full = [np.pad(v, ((0, 0), (0, width - v.shape[1]), (0, 0)), constant_values=1) for v in lines]
+    return (np.vstack(full).astype(np.float32).clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def baked_picture(head: BakedHead, view: Reference) -> np.ndarray:

@@ -182,7 +182,7 @@ def strip(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -
     if capture is not None:
         views = clip_views.recorded_views(capture, _span(avatar), _STRIP_ROWS)
     lines = [body_cost.comparison_line(*_pair(avatar, person), view) for view in views]
-    return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+    return head_cost.stacked(lines)
 
 
 def animation_of(folder: Path, avatar: TrainedAvatar) -> Animation:

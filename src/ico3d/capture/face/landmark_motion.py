@@ -13,7 +13,7 @@ HOLD = 1e-3
 A single camera says nothing of the depth of a landmark, which then keeps its mean one.
 """
 STEADY = (*range(27, 36), 36, 39, 42, 45)
-"""Landmarks that stay on the skull whatever the face does: those of the nose and corners of eyes."""
+"""Landmarks that stay on the skull whatever the face does: the nose and the corners of the eyes."""
 NOISE, SHIFT, TURN = 0.001, 0.003, 0.05
 """Usual error of a landmark, and of a head's pose, metres and radians."""
 
