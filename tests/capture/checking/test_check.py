@@ -1,6 +1,8 @@
 import numpy as np
+import pytest
 from PIL import Image
 
+from ico3d.capture.checking import head
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.cli import main
@@ -59,3 +61,11 @@ def test_sound_of_another_length_is_a_warning(folder):
 def test_no_capture_is_one_sentence(tmp_path, capsys):
     assert main(["capture", "check", str(tmp_path / "none")]) == 1
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(("pixels", "level"), [(0.02, "ok"), (2.0, "error")])
+def test_poses_of_another_frame_matter_where_pixels_do(folder, monkeypatch, pixels, level):
+    """A head that hardly moves is nowhere blurred by a pose of its neighbour."""
+    errors = {0: 2 * pixels, -1: 0.5 * pixels, 1: 3 * pixels}
+    monkeypatch.setattr(head, "_rigid_errors", lambda _, shift: np.full(9, errors[shift]))
+    assert head.landmarks(open_capture(folder)).level == level

@@ -10,7 +10,8 @@ from ico3d.capture.finding import Finding
 STEADY = (27, 28, 29, 30, 36, 39, 42, 45)
 """Landmarks that hardly move with the expression: bridge of the nose and corners of the eyes."""
 
-
+MATTERS = 0.1
+"""Pixels by which poses of another frame must fit better: a smaller shift in time blurs nothing."""
 USUAL_FPS = 25.0
 """Usual frame rate; at lower rates, heads move farther from frame to frame."""
 
@@ -70,7 +71,7 @@ def landmarks(capture: Capture) -> Finding:
     medians = {s: float(np.median(e)) for s, e in errors.items() if len(e)}
     text = f"eye corners and nose bridge stay within {medians[0]:.2f} px of the pose (median)"
     best = min(medians, key=lambda shift: medians[shift])
-    if best != 0 and medians[best] < 0.6 * medians[0]:
+    if best != 0 and medians[best] < min(0.6 * medians[0], medians[0] - MATTERS):
         text = f"poses fit the landmarks {best:+d} frame away ({medians[best]:.2f} px) better "
         return Finding("landmarks", "error", f"{text}than their own ({medians[0]:.2f} px)")
     size = _face_width(capture)
