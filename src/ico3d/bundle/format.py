@@ -13,6 +13,7 @@ from ico3d.bundle.animation import ANIMATION, Animation
 from ico3d.bundle.archive import Archive, open_archive, write_zip
 from ico3d.bundle.backdrop import BACKGROUNDS, check_background
 from ico3d.bundle.body import BakedWindow
+from ico3d.bundle.graph.check import check_onnx
 from ico3d.bundle.head import (
     HEAD,
     HEAD_REST,
@@ -23,7 +24,6 @@ from ico3d.bundle.head import (
     poses_from_bytes,
 )
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
-from ico3d.bundle.onnx_check import check_onnx
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.provenance import ClonedVoice
 from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
