@@ -7,6 +7,7 @@ import tracemalloc
 import pytest
 from PIL import Image
 
+from ico3d.capture.importing import colmap
 from ico3d.capture.importing.colmap import MOST_POINTS
 from ico3d.capture.importing.foreign import inside
 from ico3d.capture.importing.recording import import_recording
@@ -54,6 +55,52 @@ def test_a_table_of_colmap_that_claims_much_is_not_kept(tmp_path):
         assert tracemalloc.get_traced_memory()[1] < 200 << 20
     finally:
         tracemalloc.stop()
+
+
+def test_a_table_of_points_becomes_numbers_line_by_line(tmp_path):
+    """Words of all lines took fifty times as much as the file."""
+    file = tmp_path / "points3D.txt"
+    file.write_text("1 22 33 44\n" * 100_000)
+    tracemalloc.start()
+    try:
+        assert colmap._text_points(file).shape == (100_000, 3)
+        assert tracemalloc.get_traced_memory()[1] < 4 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_long_line_of_a_table_is_not_taken_apart(tmp_path):
+    file = tmp_path / "cameras.txt"
+    file.write_text("1 PINHOLE 9 9" + " 1" * 1_000_000)
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match="could not convert"):
+            colmap._text_cameras(file)
+        assert tracemalloc.get_traced_memory()[1] < 30 << 20
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("line", ["a", "1 2 3"])
+def test_lines_of_few_words_are_not_kept(tmp_path, line):
+    root = foreign_models.write_colmap(tmp_path, foreign_models.poses(2), "OPENCV", False)
+    (root / "sparse/0/points3D.txt").write_text(f"{line}\n" * 100_000)
+    tracemalloc.start()
+    try:
+        with pytest.raises(CaptureError, match="damaged or cut off"):
+            import_recording(root, tmp_path / "out", ImportSettings())
+        assert tracemalloc.get_traced_memory()[1] < 4 << 20
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("what", ["CAMERAS", "POINTS"])
+def test_a_model_of_too_many_cameras_or_points_is_refused(tmp_path, monkeypatch, what, binary):
+    root = foreign_models.write_colmap(tmp_path, foreign_models.poses(2), "OPENCV", binary)
+    monkeypatch.setattr(colmap, f"MOST_{what}", 0)
+    with pytest.raises(CaptureError, match=rf"states \d+ {what.lower()}: at most 0 are read"):
+        import_recording(root, tmp_path / "out", ImportSettings())
 
 
 @pytest.mark.parametrize("key", ["file_path", "mask_path"])

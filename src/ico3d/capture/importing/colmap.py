@@ -1,6 +1,7 @@
 """Reads COLMAP's sparse models, text and binary (COLMAP's documentation, "Output Format")."""
 
 import struct
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,9 +22,12 @@ MODELS = {
     6: ("FULL_OPENCV", 12),
 }
 """Supported camera models: number, name and number of parameters."""
+MOST_PARAMETERS = max(count for _, count in MODELS.values())
 ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
 MOST_POINTS = 20_000_000
-"""Points of a binary model that are read; models of large places have some millions."""
+"""Points of a model that are read; models of large places have some millions."""
+MOST_CAMERAS = 100_000
+"""Cameras of a model that are read: 400 bytes of memory each."""
 LONGEST_LINE = 1 << 24
 """Letters of a line, of which all points of a picture take one."""
 Pose = tuple[str, int, np.ndarray]
@@ -127,10 +131,26 @@ def _lines(file: Path) -> Iterator[str]:
                 yield line
 
 
+def _words(file: Path, most: int) -> Iterator[list[str]]:
+    """Words of the lines that have any, of which there must be four; the last has what is left."""
+    for line in _lines(file):
+        words = line.split(maxsplit=most - 1)
+        if 0 < len(words) < 4:
+            raise ValueError(f"{file} has a line of {len(words)} words")
+        if words:
+            yield words
+
+
+def _check_count(file: Path, count: int, most: int, what: str) -> None:
+    if count > most:
+        raise CaptureError(f"{file} states {count} {what}: at most {most} are read.")
+
+
 def _text_cameras(file: Path) -> dict[int, Lens]:
     """cameras.txt: number, model, width, height, parameters."""
     lenses = {}
-    for words in filter(None, map(str.split, _lines(file))):
+    for words in _words(file, MOST_PARAMETERS + 5):
+        _check_count(file, len(lenses) + 1, MOST_CAMERAS, "cameras")
         number, name, width, height = int(words[0]), words[1], int(words[2]), int(words[3])
         lenses[number] = _lens(file, number, name, width, height, list(map(float, words[4:])))
     return lenses
@@ -149,8 +169,11 @@ def _text_poses(file: Path) -> Iterator[Pose]:
 
 def _text_points(file: Path) -> np.ndarray:
     """points3D.txt: number, position, …; (P, 3)."""
-    rows = [words[1:4] for words in map(str.split, _lines(file)) if words]
-    return np.array(rows, np.float32).reshape(-1, 3)
+    numbers = array("f")
+    for words in _words(file, 5):
+        numbers.extend(map(float, words[1:4]))
+        _check_count(file, len(numbers) // 3, MOST_POINTS, "points")
+    return np.array(numbers, np.float32).reshape(-1, 3)
 
 
 class _Bytes:
@@ -184,10 +207,12 @@ class _Bytes:
 def _binary_cameras(file: Path) -> dict[int, Lens]:
     """cameras.bin."""
     data, lenses = _Bytes(file), {}
-    for _ in range(data.take("Q")[0]):
+    count = data.take("Q")[0]
+    _check_count(file, count, MOST_CAMERAS, "cameras")
+    for _ in range(count):
         number, model, width, height = data.take("iiQQ")
-        name, count = MODELS.get(model, (f"number {model}", 0))
-        values = list(data.take(f"{count}d"))
+        name, parameters = MODELS.get(model, (f"number {model}", 0))
+        values = list(data.take(f"{parameters}d"))
         lenses[number] = _lens(file, number, name, width, height, values)
     return lenses
 
@@ -205,8 +230,7 @@ def _binary_points(file: Path) -> np.ndarray:
     """points3D.bin, (P, 3)."""
     data = _Bytes(file)
     count = data.take("Q")[0]
-    if count > MOST_POINTS:
-        raise CaptureError(f"{file} states {count} points: at most {MOST_POINTS} are read.")
+    _check_count(file, count, MOST_POINTS, "points")
     points = np.empty((count, 3), np.float32)
     for row in points:
         row[:] = data.take("Q3d3Bd")[1:4]
