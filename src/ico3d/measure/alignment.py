@@ -15,6 +15,8 @@ _IPA = (
     "ZH ʒ"
 )
 _SYMBOLS = dict(zip(_IPA.split()[::2], _IPA.split()[1::2], strict=True))
+MOST_README = 1 << 20
+"""Bytes of the table of a folder's recordings; its cells take fifty times as much."""
 _STEP = 100  # of the aligner's times per second
 
 
@@ -29,7 +31,7 @@ def transcripts(folder: Path) -> dict[Path, str]:
         SettingsError: If there is no such table, or a file of the table is missing.
     """
     try:
-        lines = read_small(folder / "README.md").decode("utf-8").splitlines()
+        lines = read_small(folder / "README.md", most=MOST_README).decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         raise SettingsError(f"{folder} has no README.md that says what is said.") from None
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if "|" in line]
