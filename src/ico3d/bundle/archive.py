@@ -13,11 +13,10 @@ from typing import BinaryIO
 
 from ico3d.bundle import limits
 from ico3d.common.files import write_atomic
+from ico3d.common.unpacking.zips import OtherEndError, directory
 from ico3d.errors import BundleError
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}(/[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}){0,3}")
-_END_RECORD = struct.Struct("<4s4H2LH")
-_ZIP64_LOCATOR_BYTES = 20
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -145,22 +144,16 @@ def _check_directory(file: BinaryIO, path: Path) -> None:
     size = file.seek(0, os.SEEK_END)
     if size > limits.MAX_BUNDLE_BYTES:
         raise BundleError(f"{path.name}: is larger than {limits.MAX_BUNDLE_BYTES} bytes.")
-    if size < _END_RECORD.size:
-        raise BundleError(f"{path.name}: is too short to be a bundle.")
-    file.seek(size - _END_RECORD.size)
-    signature, disk, first_disk, here, count, length, start, comment = _END_RECORD.unpack(
-        file.read(_END_RECORD.size)
-    )
-    if signature != b"PK\5\6" or comment or disk or first_disk or here != count:
-        raise BundleError(f"{path.name}: is not a plain zip archive, or it was cut off.")
-    if count > limits.MAX_FILES or length > limits.MAX_MANIFEST_BYTES:
+    try:
+        found = directory(file)
+    except OtherEndError as error:
+        raise BundleError(f"{path.name}: {error}.") from error
+    if found.count > limits.MAX_FILES or found.length > limits.MAX_MANIFEST_BYTES:
         raise BundleError(f"{path.name}: holds more than {limits.MAX_FILES} files.")
-    file.seek(max(0, size - _END_RECORD.size - _ZIP64_LOCATOR_BYTES))
-    if file.read(4) == b"PK\6\7":
+    if found.far:
         raise BundleError(f"{path.name}: is a zip64 archive; no bundle is that large.")
-    if start + length + _END_RECORD.size != size:
+    if found.start + found.length != found.end:
         raise BundleError(f"{path.name}: its directory is not where it should be.")
-    file.seek(0)
 
 
 def _check_entry(entry: zipfile.ZipInfo) -> None:

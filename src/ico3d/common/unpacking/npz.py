@@ -12,6 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from ico3d.common.files import check_regular
+from ico3d.common.unpacking.zips import check_directory
 
 DAMAGED = (
     *(ValueError, EOFError, LookupError, TypeError, AttributeError, ArithmeticError),
@@ -50,11 +51,13 @@ def read_npz(file: Path, most: int, names: Iterable[str] | None = None) -> dict[
     """
     check_regular(file)
     try:
-        with zipfile.ZipFile(file) as archive:
-            members = _members(archive, names)
-            if sum(_size(archive, member) for member in members.values()) > most:
-                raise TooLargeError("its arrays are larger than is taken")
-            return {name: _array(archive, member) for name, member in members.items()}
+        with file.open("rb") as opened:
+            check_directory(opened)
+            with zipfile.ZipFile(opened) as archive:
+                members = _members(archive, names)
+                if sum(_size(archive, member) for member in members.values()) > most:
+                    raise TooLargeError("its arrays are larger than is taken")
+                return {name: _array(archive, member) for name, member in members.items()}
     except (TooLargeError, LackingError):
         raise
     except DAMAGED as error:

@@ -4,6 +4,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+from ico3d.common.unpacking.zips import check_directory
 from ico3d.errors import ModelError
 
 ZIP = b"PK\3\4"
@@ -21,6 +22,7 @@ def check_unpacked(path: Path) -> None:
         if file.read(len(ZIP)) != ZIP:
             return
         try:
+            check_directory(file)
             with zipfile.ZipFile(file) as archive:
                 entries = archive.infolist()
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
