@@ -2,6 +2,7 @@ import io
 import json
 import shutil
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -275,6 +276,23 @@ def test_a_table_that_takes_no_room_on_a_disk_is_not_read(folder):
     with (folder / "au.csv").open("wb") as file:
         file.truncate(MOST_NOTES + 1)
     _fails(folder, "au.csv", "no small file")
+
+
+def test_a_table_of_action_units_is_not_kept_as_text(folder):
+    """A single sign of four bytes made each letter as large."""
+    head, *rows = (folder / "au.csv").read_text().splitlines()
+    signs = "1" * 20_000
+    lines = [f"{head},\U0001f600", *(f"{row},{signs}" for row in rows)]
+    (folder / "au.csv").write_text("\n".join(lines), "utf-8")
+    size = (folder / "au.csv").stat().st_size
+    capture = open_capture(folder)
+    vars(capture).pop("_action_units")  # read when the folder was opened
+    tracemalloc.start()
+    try:
+        assert len(capture._action_units["AU45_r"]) == len(rows)
+        assert tracemalloc.get_traced_memory()[1] < 3 * size
+    finally:
+        tracemalloc.stop()
 
 
 def test_half_a_picture_of_a_parsing(folder):

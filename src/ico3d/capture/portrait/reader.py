@@ -189,18 +189,16 @@ class TalkingPortrait(RecordedCapture):
         path = self.path / "au.csv"
         if not path.is_file():
             return None
-        text = _reading(path, lambda: read_small(path).decode())
-        header = text.split("\n", 1)[0].split(",")
-        names = [name.strip() for name in header]
+        # OpenFace's tables have megabytes, and as one text up to four times as many
+        lines = io.TextIOWrapper(io.BytesIO(_reading(path, lambda: read_small(path))), "utf-8")
+        names = [name.strip() for name in _reading(path, lines.readline).split(",")]
         missing = [name for name in AU_COLUMNS if name not in names]
         if missing:
             raise CaptureError(f"{path}: there is no column {missing[0]}; OpenFace writes it.")
         wanted = [names.index(name) for name in AU_COLUMNS]
         table = _reading(
             path,
-            lambda: np.loadtxt(
-                io.StringIO(text), delimiter=",", skiprows=1, usecols=wanted, ndmin=2
-            ),
+            lambda: np.loadtxt(lines, delimiter=",", usecols=wanted, ndmin=2),
         )
         return dict(zip(AU_COLUMNS, table.T, strict=True))
 
