@@ -1,5 +1,6 @@
 import { copyFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { setTimeout as sleep } from 'node:timers/promises';
 import { chromium, type Browser as Chromium, type BrowserContext, type Page } from 'playwright-core';
 import { PATIENCE } from '../patience.ts';
 import { scratchFolder } from '../scratch.ts';
@@ -50,6 +51,8 @@ const FLAGS_OF: Record<Kind, string[]> = {
   hearing: [...FLAGS, ...MICROPHONE],
   seeing: [...FLAGS, ...MICROPHONE, `--use-file-for-fake-video-capture=${SEEN}`],
 };
+/** How long a page may take to close, ms. */
+const CLOSING = 30_000;
 type Kind = 'plain' | 'hearing' | 'seeing';
 
 /** How a browser is opened. */
@@ -98,8 +101,10 @@ function halveRefreshRate(): void {
 export class Browser {
   readonly context: BrowserContext;
   readonly page: Page;
+  private readonly kind: Kind;
 
-  private constructor(context: BrowserContext, page: Page) {
+  private constructor(kind: Kind, context: BrowserContext, page: Page) {
+    this.kind = kind;
     this.context = context;
     this.page = page;
     context.setDefaultTimeout(PATIENCE);
@@ -121,7 +126,7 @@ export class Browser {
       reducedMotion: calm ? 'reduce' : 'no-preference',
     });
     if (hertz === 30) await context.addInitScript(halveRefreshRate);
-    return new Browser(context, await context.newPage());
+    return new Browser(kind, context, await context.newPage());
   }
 
   /**
@@ -136,7 +141,12 @@ export class Browser {
     return this.page;
   }
 
-  close(): Promise<void> {
-    return this.context.close();
+  /** Closes the page; a Chromium that does not answer is ended, for by now everything has been judged. */
+  async close(): Promise<void> {
+    const closed = this.context.close().then(() => true);
+    if (await Promise.race([closed, sleep(CLOSING, false, { ref: false })])) return;
+    console.error(`Chromium did not close a page within ${CLOSING / 1000} s and is ended`);
+    running.delete(this.kind); // the next of its kind is a new one
+    await this.context.browser()!.close(); // by force, where asking does not help
   }
 }
