@@ -25,6 +25,7 @@ interface Shot {
 }
 
 const ACROSS_A_TABLE: Shot = { line: 0.3, height: 0.62, width: 0.4 }; // head and chest
+const WITH_HANDS: Shot = { line: 0.26, height: 0.76, width: 0.52 }; // down to where gestures are made, over the controls
 const CLOSE: Shot = { line: 0.42, height: 0.32, width: 0.26 };
 const FACE = 0.24; // m of width that are always seen
 const ABOVE = 0.03; // m over the head
@@ -41,6 +42,15 @@ const CHIN = 0.15; // m down from the eyes to under the chin
  */
 export function portrait(sitter: Sitter, fov: number): Framing {
   return upperPart(sitter, fov, ACROSS_A_TABLE);
+}
+
+/**
+ * Frames somebody with a body from the head to hands that speak: they are raised before the chest.
+ *
+ * @param fov degrees, from top to bottom
+ */
+export function talking(sitter: Sitter, fov: number): Framing {
+  return upperPart(sitter, fov, WITH_HANDS);
 }
 
 /**

@@ -1,7 +1,7 @@
 import * as THREE from 'three';
 import { bodyOf, type Manifest } from '../../bundle/manifest.ts';
 import { boundsOf, boundsOfBody } from './bounds.ts';
-import { closeUp, figure, portrait, whole } from './framing.ts';
+import { closeUp, figure, portrait, talking, whole } from './framing.ts';
 import type { Subject } from './orbit.ts';
 import type { Ground } from './ground.ts';
 import { corners, type Sitter } from './sitter.ts';
@@ -29,10 +29,11 @@ export function wholeBody(manifest: Manifest): Subject {
 export function person(manifest: Manifest, sitter: Sitter): Subject {
   const { camera } = manifest;
   const fov = camera.fov_y;
-  const views = { face: closeUp(sitter, fov), half: portrait(sitter, fov) };
+  const face = closeUp(sitter, fov);
+  const body = { half: talking(sitter, fov), whole: figure(sitter, fov) };
   return {
     up: camera.up,
-    framings: bodyOf(manifest) ? { ...views, whole: figure(sitter, fov) } : views,
+    framings: bodyOf(manifest) ? { face, ...body } : { face, half: portrait(sitter, fov) },
     home: 'half',
     bounds: (start) => boundsOf(sitter, start, camera),
     sideways: bodyOf(manifest) ? Infinity : FRONT,
