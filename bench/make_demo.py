@@ -98,7 +98,7 @@ BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=14)
 """25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5500 "
-    "--density.gradient 0.00018 --density.min-contribution 0.15 --displacements 8"
+    "--density.gradient 0.00018 --density.min-contribution 0.15 --displacements 8 --smile"
 )
 TRAIN_BODY = (
     "--steps-per-frame 100 --initial.gaussians 64000 --initial.opacity 0.8 "
@@ -148,10 +148,10 @@ class Demo:
         if not person.exists():
             arrays: dict[str, Any] = slenderer(dict(np.load(self.subject)), SLENDER)
             write_atomic(person, lambda path: np.savez_compressed(path, **arrays))
-        # moods and glances are nothing that a voice could drive
-        self._record(person, work / "head-capture", "head", self.head_shot)
+        # moods and glances are nothing that a voice could drive, except for a smile, which is told
+        self._record(person, work / "head-capture", "head", self.head_shot, "--manner", "smiling")
         body = (work / "body-capture", "body", self.body_shot)
-        self._record(person, *body, "--motion", "repertoire")
+        self._record(person, *body, "--motion", "repertoire", "--manner", "friendly")
         self._train_head(work / "head-capture", work / "head")
         if not track_file(work / "body-capture").exists():
             write_body_track(true_track(work / "body-capture", person), work / "body-capture")
@@ -180,7 +180,7 @@ class Demo:
             flush=True,
         )
         who = ("--subject", subject, "--seed", self.seed, "--rig", rig)
-        who = (*who, "--no-lively", "--manner", "friendly", "--light", LIGHT)
+        who = (*who, "--no-lively", "--light", LIGHT)
         ico3d("capture synthetic", capture, *who, *shot.words(), *more, "--workers", self.threads)
 
     def _train_head(self, capture: Path, head: Path) -> None:

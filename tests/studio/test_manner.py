@@ -1,10 +1,12 @@
 """A friendly person smiles all the time, and still speaks, blinks and closes the lips."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from ico3d.studio.acting.manner import MANNERS, mannered
-from ico3d.studio.acting.performance import perform
+from ico3d.studio.acting.manner import GLAD, MANNERS, mannered
+from ico3d.studio.acting.performance import SOUND_RATE, perform
 from ico3d.studio.person.choice import load_subject
 from support.needs import needs
 
@@ -29,7 +31,7 @@ def test_a_friendly_person_smiles_in_every_frame_and_does_the_same_otherwise(ann
     friendly = mannered(anny, acted, "friendly")
     names = anny.blendshape_names
     for column, name in enumerate(names):
-        added = MANNERS["friendly"].get(name, 0.0)
+        added = GLAD.get(name, 0.0)
         wanted = np.minimum(acted.weights[:, column] + np.float32(added), 1)
         np.testing.assert_array_equal(friendly.weights[:, column], wanted)
     smile = names.index("mouthSmileLeft")
@@ -39,10 +41,30 @@ def test_a_friendly_person_smiles_in_every_frame_and_does_the_same_otherwise(ann
     assert friendly.weights.dtype == acted.weights.dtype
 
 
+def test_a_smiling_person_is_now_grave_and_now_laughs_and_neither_changes_within_a_word(
+    anny, acted
+):
+    seconds = 60
+    longer = replace(
+        acted,
+        weights=np.zeros((25 * seconds, len(anny.blendshape_names)), np.float32),
+        samples=np.zeros(seconds * SOUND_RATE, np.float32),
+    )
+    smile = mannered(anny, longer, "smiling", 3).weights[
+        :, anny.blendshape_names.index("mouthSmileLeft")
+    ]
+    least, most = (share * GLAD["mouthSmileLeft"] for share in MANNERS["smiling"])
+    assert smile.min() == pytest.approx(least, abs=0.02)
+    assert smile.max() == pytest.approx(most, abs=0.02)
+    assert np.abs(smile[5:] - smile[:-5]).max() < 0.25 * (most - least)  # a fifth of a second
+    other = mannered(anny, longer, "smiling", 4).weights
+    assert np.abs(other - mannered(anny, longer, "smiling", 3).weights).max() > 0.3
+
+
 def test_a_smile_keeps_lips_closed_at_bilabials(anny):
-    smile = anny.weights(MANNERS["friendly"])
+    smile = MANNERS["smiling"][1] * anny.weights(GLAD)
     gaps = {}
     for viseme in ("PP", "aa"):
         marks = anny.landmarks(anny.posed(np.minimum(anny.visemes[viseme] + smile, 1)))
         gaps[viseme] = np.linalg.norm(marks[62] - marks[66])
-    assert gaps["PP"] < 0.003 and gaps["aa"] > 0.012
+    assert gaps["PP"] < 0.0035 and gaps["aa"] > 0.012

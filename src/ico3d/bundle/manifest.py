@@ -53,7 +53,8 @@ class HeadInfo:
         inputs: What drives the head: `speech` or `blendshapes`.
         expression_size: B, number of values of an expression.
         eye_offset: Index of the first of the seven eye and brow values
-            (`ico3d.common.expression.EYE_NAMES`) in an expression; null for a head without them.
+            (`ico3d.common.expression.EYE_NAMES`) in an expression; null for a head without them. A
+            value after these seven is the smile.
         expression_names: Names of the B blendshapes; empty for speech.
         fps: Head poses per second; on a body the body's frame rate.
         num_poses: F, number of head poses; on a body one for each frame of the body.

@@ -1,4 +1,4 @@
-"""What drives a head: speech values, then eye values; and how the head is turned."""
+"""What drives a head: speech, then eyes and brows, then a smile; and how the head is turned."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,10 @@ EYE_NAMES = (
     "eyeBlinkLeft",
     "eyeBlinkRight",
 )
-"""ARKit names of the seven eye and brow values, 0 to 1, at the end of the expression vector."""
+"""ARKit names of the seven eye and brow values, 0 to 1, after the speech values."""
+
+SMILES = ("mouthSmileLeft", "mouthSmileRight")
+"""ARKit names of the blendshapes whose mean is the smile, which heads that know it have last."""
 
 TURN_SIZE = 3
 """Number of values that tell how a head is turned, after the expression vector."""
@@ -36,31 +39,33 @@ LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
 
 @dataclass(frozen=True)
 class EyeRange:
-    """How far the eyes and brows of one person were seen to move.
+    """How far eyes and brows of one person, and the smile where a head knows it, were seen to move.
 
     A head model is undefined outside of the values it was trained with: where a brow moved by 0.01
     in the recording, raising it by 0.5 tears the whole face apart.
 
     Attributes:
-        rest: (7,) values of eyes and brows at rest, in the order of `EYE_NAMES`.
-        most: (7,) highest values seen, none below `rest`.
+        rest: (7,) values of eyes and brows at rest, in the order of `EYE_NAMES`; (8,) with the
+            smile.
+        most: (7,) or (8,) highest values seen, none below `rest`.
     """
 
     rest: tuple[float, ...] = (0.0,) * len(EYE_NAMES)
     most: tuple[float, ...] = (1.0,) * len(EYE_NAMES)
 
     def values(self, shares: np.ndarray) -> np.ndarray:
-        """Values (..., 7) of shares (..., 7) of the way from rest (0) to the highest seen (1)."""
-        rest, most = np.array(self.rest, np.float32), np.array(self.most, np.float32)  # (7,), (7,)
+        """Values (..., V) of shares (..., V) of the way from rest (0) to the highest seen (1)."""
+        rest, most = np.array(self.rest, np.float32), np.array(self.most, np.float32)  # (V,), (V,)
         return rest + np.asarray(shares, np.float32) * (most - rest)
 
 
 def eye_range(recorded: np.ndarray) -> EyeRange:
-    """The range of eyes and brows in a recording (T, 7).
+    """The range of eyes and brows in a recording (T, 7), or of these and the smile (T, 8).
 
-    Brows rest at their median; lids rest at the 10th percentile of closure, nearly fully open.
+    Brows and smile rest at their median; lids rest at the 10th percentile of closure, nearly fully
+    open.
     """
-    rest = np.median(recorded, axis=0)  # (7,)
+    rest = np.median(recorded, axis=0)  # (V,)
     rest[LIDS] = np.percentile(recorded[:, LIDS], 10, axis=0)
     most = np.maximum(recorded.max(axis=0), rest)
     return EyeRange(*(tuple(round(float(value), 6) for value in row) for row in (rest, most)))
@@ -74,7 +79,8 @@ def expression_rows(
     Args:
         idle: (B,) expression of the resting face.
         lips: (n, C) values of the mouth, put at the start of each row; C = 0 for a mouth at rest.
-        eyes: (n, 7) values of eyes and brows.
+        eyes: (n, 7) values of eyes and brows, or (n, 8) with a smile, which heads that do not know
+            it leave out.
         eye_offset: Column at which the values of the eyes start; None for a face without them.
 
     Returns:
@@ -83,5 +89,6 @@ def expression_rows(
     rows = np.tile(np.asarray(idle, np.float32), (len(lips), 1))  # (n, B)
     rows[:, : lips.shape[1]] = lips
     if eye_offset is not None:
-        rows[:, eye_offset : eye_offset + len(EYE_NAMES)] = eyes
+        room = rows[:, eye_offset : eye_offset + eyes.shape[1]]  # (n, 7 or 8)
+        room[:] = eyes[:, : room.shape[1]]
     return rows

@@ -9,11 +9,12 @@ from typing import Protocol
 
 import numpy as np
 import torch
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
+from ico3d.common.expression import EYE_NAMES, SMILES, SPEECH_SIZE
 from ico3d.errors import CaptureError
 from ico3d.head.views import head_pose
 from ico3d.speech.encoder import FrozenEncoder
@@ -28,6 +29,8 @@ USUAL = 0.3
 """Root mean square of a blendshape that is learnt as fast as `rates.basis` says."""
 FASTEST = 4.0
 """Largest factor by which a row of the basis learns faster because its blendshape is small."""
+MOOD = 0.4
+"""Standard deviation in seconds of the filter by which a smile is told from what lips say."""
 LEAST_TURN = 0.02
 """Angle in radians up to which a head counts as still: less is an error of its tracking."""
 
@@ -109,18 +112,16 @@ def is_of_eyes(track: ExpressionTrack) -> Tensor:
         return torch.tensor([name.startswith(("eye", "brow")) for name in track.names])
     eyes = torch.zeros(track.size, dtype=torch.bool)
     if isinstance(track, SpeechTrack):
-        eyes[-len(EYE_NAMES) :] = True
+        eyes[SPEECH_SIZE : SPEECH_SIZE + len(EYE_NAMES)] = True
     return eyes
 
 
 class SpeechTrack:
-    """Expressions of 32 adapted speech features and 7 eye values, B = 39.
+    """Expressions of 32 adapted speech features and 7 eye values, B = 39; B = 40 with a smile.
 
     Attributes:
-        eyes: (F, 7) the eye values of all frames.
+        eyes: (F, 7) the eye values of all frames; (F, 8) with the smile.
     """
-
-    size = SPEECH_SIZE + len(EYE_NAMES)
 
     def __init__(
         self,
@@ -128,8 +129,9 @@ class SpeechTrack:
         features: np.ndarray,
         adaptor: SpeechAdaptor,
         needs_eyes: bool = True,
+        smile: bool = False,
     ):
-        """Combines sound features, adaptor and eye values of one capture.
+        """Combines sound features, adaptor, eye values and smile of one capture.
 
         Args:
             capture: Provides eye values and frame rate.
@@ -137,14 +139,21 @@ class SpeechTrack:
             adaptor: Network from speech features to speech values.
             needs_eyes: Whether to warn if eye values are missing; a head that was trained without
                 eye values does not need them.
+            smile: Whether the smile is told, too.
+
+        Raises:
+            CaptureError: If a smile is wanted, and the capture has no blendshapes that tell it.
         """
         self._adaptor = adaptor
         self._fps = capture.fps
         self.eyes = eye_track(capture, needs_eyes)  # (F, 7)
+        if smile:
+            self.eyes = torch.cat([self.eyes, smile_track(capture)[:, None]], 1)  # (F, 8)
+        self.size = SPEECH_SIZE + self.eyes.shape[1]
         self._features = torch.from_numpy(features)
 
     def at(self, frame: int) -> Tensor:
-        """The expression (39,) of a frame, interpolated in time between rows of features."""
+        """The expression (B,) of a frame, interpolated in time between rows of features."""
         position = min(frame / self._fps * FEATURE_RATE, len(self._features) - 1.0)
         lower = int(position)
         part = position - lower
@@ -166,6 +175,34 @@ def eye_track(capture: Capture, needed: bool = True) -> Tensor:
     for frame in lacking:
         rows[frame] = np.zeros(len(EYE_NAMES), np.float32)
     return torch.from_numpy(np.stack(rows).astype(np.float32))  # type: ignore[arg-type]
+
+
+def smile_track(capture: Capture) -> Tensor:
+    """How much the person smiles (F,) in all frames, whatever the lips say.
+
+    It is the mean of two blendshapes. Vowels stretch lips, too, for a tenth of a second, which is
+    averaged away; a sound that drives a mouth tells the rest.
+
+    Raises:
+        CaptureError: If the capture has no such blendshapes.
+    """
+    names = capture.blendshape_names or ()
+    if not set(SMILES) <= set(names):
+        raise CaptureError(
+            f"{capture.path} does not tell how much the person smiles, for it has no blendshapes: "
+            "train without --smile, or record it with ico3d capture portrait."
+        )
+    columns = [names.index(name) for name in SMILES]
+    rows = [capture.blendshapes(frame) for frame in range(capture.num_frames)]
+    told = np.array([np.nan if row is None else row[columns].mean() for row in rows])  # (F,)
+    known = np.isfinite(told)
+    if not known.any():
+        raise CaptureError(
+            f"{capture.path}: no frame has finite blendshapes: look at it with ico3d capture check."
+        )
+    told = np.interp(np.arange(len(told)), np.flatnonzero(known), told[known])
+    smooth = gaussian_filter1d(told, MOOD * capture.fps, mode="nearest")
+    return torch.from_numpy(smooth.astype(np.float32))
 
 
 @cache

@@ -50,7 +50,8 @@ class TrainedHead:
         summary: How the head was made: provenance of the capture, seconds of training, settings.
         landmarks: (68, 3) Multi-PIE landmarks in canonical head space, metres, by which the head is
             placed on a body; None where the capture has none.
-        eyes: How far eyes and brows moved in the recording; used where `inputs` is `speech`.
+        eyes: How far eyes, brows and, for a head that smiles, the smile moved in the recording;
+            used where `inputs` is `speech`.
         turn: How far the head turned in the recording; None if the model ignores that.
     """
 
@@ -80,6 +81,11 @@ class TrainedHead:
         """Whether the head alone was learnt, over the recorded torso of a portrait."""
         return self.summary.get("recording", {}).get("over_torso", False)
 
+    @property
+    def smiles(self) -> bool:
+        """Whether the last value of an expression is a smile."""
+        return self.adaptor is not None and len(self.eyes.rest) > len(EYE_NAMES)
+
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
 
@@ -104,7 +110,13 @@ class TrainedHead:
                 f"({self.encoder_sha256[:12]}, not {encoder.sha256[:12]}): train it again."
             )
         features = speech_features(capture, encoder, self.model.device)  # (T, D)
-        return SpeechTrack(capture, features, self.adaptor, needs_eyes=any(self.eyes.most))
+        return SpeechTrack(
+            capture,
+            features,
+            self.adaptor,
+            needs_eyes=any(self.eyes.most[: len(EYE_NAMES)]),
+            smile=self.smiles,
+        )
 
     def neutral(self) -> np.ndarray:
         """The resting expression (B,) float32: silence, open eyes, brows at rest."""
@@ -202,10 +214,10 @@ def _eyes(values: dict | None) -> EyeRange:
     """
     if values is None:
         return EyeRange()
-    rows = np.array([values["rest"], values["most"]], np.float64)  # (2, 7)
-    seven = rows.shape == (2, len(EYE_NAMES)) and np.isfinite(rows).all()
-    if not seven or (rows[1] < rows[0]).any():
-        raise ValueError("eyes must be seven values at rest, and seven that are not lower")
+    rows = np.array([values["rest"], values["most"]], np.float64)  # (2, 7 or 8)
+    whole = rows.shape in ((2, len(EYE_NAMES)), (2, len(EYE_NAMES) + 1)) and np.isfinite(rows).all()
+    if not whole or (rows[1] < rows[0]).any():
+        raise ValueError("eyes must be seven or eight values at rest, and others not lower")
     return EyeRange(tuple(rows[0].tolist()), tuple(rows[1].tolist()))
 
 

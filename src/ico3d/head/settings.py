@@ -180,6 +180,8 @@ class HeadSettings:
             Not in the paper.
         displacements: Most ways in which Gaussians move with the expression, as the face's
             landmarks do; 0 for Gaussians that stand still, as in the paper.
+        smile: Let a head that speech drives also be told how much the person smiles, so that its
+            avatar smiles when it is glad; for recordings with blendshapes. Not in the paper.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
             direction of view; bundles keep degree 0.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
@@ -204,6 +206,7 @@ class HeadSettings:
     even_rows: bool = False
     close_ups: int = 0
     displacements: int = 0
+    smile: bool = False
     sh_degree: int = 0
     sh_every: int = 1_000
     checkpoint_every: int = 1_000

@@ -204,7 +204,7 @@ def tell_moves(model: HeadModel, track: ExpressionTrack, moves: Mapping[int, tor
 
 
 def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:
-    """How far eyes and brows move in the frames that train the head."""
+    """How far eyes, brows and smile move in the frames that train the head."""
     if not isinstance(track, SpeechTrack):
         return EyeRange()
     return eye_range(track.eyes[list(capture.split.train)].numpy())
@@ -232,4 +232,5 @@ def _inputs(
     elif encoder.articulation is not None:  # what lips do in general is better than nothing
         weight = encoder.articulation[0].numpy()  # (5, D)
         read_lips(adaptor, features, np.arange(len(features)), features @ weight.T)
-    return SpeechTrack(capture, features, adaptor), adaptor, (encoder.name, encoder.sha256)
+    track = SpeechTrack(capture, features, adaptor, smile=job.settings.smile)
+    return track, adaptor, (encoder.name, encoder.sha256)

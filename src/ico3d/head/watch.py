@@ -102,4 +102,5 @@ def _named_inputs(model: HeadModel, track: ExpressionTrack) -> dict[str, int]:
         return {}
     if isinstance(track, BlendshapeTrack):
         return {name: index for index, name in enumerate(track.names)}
-    return {name: SPEECH_SIZE + index for index, name in enumerate(EYE_NAMES)}
+    names = (*EYE_NAMES, "smile")[: track.size - SPEECH_SIZE]
+    return {name: SPEECH_SIZE + index for index, name in enumerate(names)}

@@ -121,7 +121,7 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     acted = perform(
         subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
-    acted = mannered(subject, acted, recording.manner)
+    acted = mannered(subject, acted, recording.manner, recording.seed)
     if recording.whole:
         clear = recording.arms_clear
         acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed, clear)

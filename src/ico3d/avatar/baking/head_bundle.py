@@ -22,7 +22,7 @@ from ico3d.bundle.manifest import (
     SpeechInfo,
 )
 from ico3d.capture.capture import Capture
-from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
+from ico3d.common.expression import SPEECH_SIZE
 from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.model_folder import TrainedHead
@@ -210,7 +210,7 @@ def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
     """
     if head.adaptor is None:
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
-    return np.concatenate([head.neutral()[:SPEECH_SIZE], np.zeros(len(EYE_NAMES), np.float32)])
+    return np.concatenate([head.neutral()[:SPEECH_SIZE], np.zeros(len(head.eyes.rest), np.float32)])
 
 
 def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:

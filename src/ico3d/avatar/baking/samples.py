@@ -26,6 +26,8 @@ _SIZE, _FOV = 192, 20.0
 """Side in pixels, and field of view in degrees, of pictures drawn without a recording."""
 _SIDES = np.deg2rad([0, -35, 20, 60, -15, 40, -60, -5])
 """Azimuths in radians of the cameras that draw them, 0 in front, taken in turn."""
+_SMILE = 7.0
+"""Seconds in which a smile comes and goes."""
 _VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+f5")
 """Voices of espeak-ng that read texts in turn."""
 
@@ -84,7 +86,7 @@ def expressions_at(track: ExpressionTrack, frames: Sequence[int]) -> np.ndarray:
 def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -> np.ndarray:
     """(T, B) expressions, 25 per second, of a head driven by speech that reads texts aloud.
 
-    Synthetic voices read the texts; eyes blink and move by themselves.
+    Synthetic voices read the texts; eyes blink and move by themselves, and a smile comes and goes.
 
     Args:
         head: A head driven by speech.
@@ -99,8 +101,11 @@ def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -
         speech = synthesize(text, _VOICES[number % len(_VOICES)], rate=150)
         rows.append(lips_of(head, speech.samples, speech.rate))
     lips = np.concatenate(rows)
-    eyes = EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE)
-    return head.recorded(np.concatenate([lips, eyes], 1))
+    times = np.arange(len(lips)) / FEATURE_RATE
+    smile = 0.5 - 0.5 * np.cos(2 * np.pi * times / _SMILE)  # (T,)
+    face = np.column_stack([EyeBehaviour(seed).values(times), smile])  # (T, 8)
+    driven = np.concatenate([lips, face[:, : len(head.eyes.rest)]], 1)  # (T, B)
+    return head.recorded(driven.astype(np.float32))
 
 
 def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:

@@ -96,6 +96,7 @@ class ExpressionProcessor(FrameProcessor):
         elif isinstance(frame, AggregatedTextFrame) and frame.will_be_spoken:
             await self._end_sentence()
             self._text = frame.text
+            self._face.moods.hear(frame.text)
         await self.push_frame(frame, direction)
 
     async def _speak(self, frame: TTSAudioRawFrame) -> None:

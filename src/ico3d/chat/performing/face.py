@@ -37,7 +37,7 @@ class Lips(Protocol):
 
 
 class Face:
-    """The face of one session: the speech model, brows, and eyes that move between sentences."""
+    """The face of one session: the speech model, moods, and eyes that move between sentences."""
 
     def __init__(
         self,
@@ -93,8 +93,9 @@ class Face:
         times = start + np.arange(len(lips)) / EXPRESSION_FPS
         idle, at = np.array(self._info.idle_expression), self._info.eye_offset
         stressed = self._emphasis.values(times, sound.astype(np.float32) / 32768, SPEECH_RATE)
-        eyes = self._eyes.values(times) + self.moods.values(times) + stressed
-        return expression_rows(idle, lips, np.clip(eyes, 0, 1), at)
+        face = self.moods.values(times)  # (n, 8)
+        face[:, : stressed.shape[1]] += self._eyes.values(times) + stressed
+        return expression_rows(idle, lips, np.clip(face, 0, 1), at)
 
 
 class StillLips:

@@ -17,7 +17,7 @@ from pipecat.services.llm_service import FunctionCallParams
 
 from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.gestures import Gestures
-from ico3d.chat.performing.moods import BROWS, Moods
+from ico3d.chat.performing.moods import FACES, Moods
 from ico3d.chat.settings.tools import OWN
 
 GESTURE, MOOD = OWN
@@ -74,10 +74,10 @@ def mood_function(moods: Moods, said: Said) -> FunctionSchema:
     """The function `mood(name)`."""
 
     async def call(params: FunctionCallParams) -> None:
-        await _try(params, list(BROWS), moods.set, said)
+        await _try(params, list(FACES), moods.set, said)
 
     what = f"Shows a mood on the face until the answer ends. {BESIDE}"
-    return _with_name(MOOD, what, list(BROWS), call)
+    return _with_name(MOOD, what, list(FACES), call)
 
 
 def _with_name(function: str, what: str, names: list[str], call: Any) -> FunctionSchema:

@@ -75,6 +75,12 @@ def meanings(words: tuple[Word, ...]) -> dict[int, str]:
     return found
 
 
+def called_for(text: str) -> list[str]:
+    """The gestures that the words of a text call for, in their order."""
+    found = meanings(tuple(Word(said, 0.0, 0.0) for said in text.split()))
+    return [found[i] for i in sorted(found)]
+
+
 def stressed(word: Word) -> bool:
     """Whether a word can be stressed, unlike the light words of the lexicon."""
     return not set(plain(word.text)) <= lexicon().light

@@ -55,7 +55,8 @@ def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Gen
     path[..., 1] += (0.045 * (1 - front) * combed)[:, None] * np.sin(np.pi * t)
     path = unit(path)
     level = random.random(count) ** 0.45  # 1: on the surface
-    full = 0.0050 + 0.0062 * smooth(0.2, 0.9, path[..., 1]) * np.sin(np.pi * t) ** 0.5
+    top = smooth(0.2, 0.9, path[..., 1]) * np.exp(-((path[..., 0] / 0.5) ** 2))  # (N, K)
+    full = 0.0042 + 0.0042 * top * np.sin(np.pi * t) ** 0.5
     full = full + 0.004 * smooth(0.2, 0.8, t)[None]
     full = full * (1 + 0.05 * random.standard_normal(LOCKS)[lock] - 0.06 * edge)[:, None]
     rise = 1 - np.exp(-4 * t)
