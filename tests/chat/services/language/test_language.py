@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from fastapi.responses import RedirectResponse, Response, StreamingResponse
 
 from ico3d.chat.memory import PROMPT
-from ico3d.chat.performing.moods import BROWS, EASE
+from ico3d.chat.performing.moods import EASE, FACES
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, local, openai
 from ico3d.chat.services.language.compatible import MOST_ROUNDS
@@ -135,9 +135,9 @@ async def test_a_mood_moves_the_brows_smoothly_until_the_answer_ends(bundle, mon
         await ask(page, "and now?", 1)
     (function,) = [tool["function"] for tool in script.requests[0]["tools"]]
     assert function["name"] == "mood" and function["parameters"]["required"] == ["name"]
-    assert function["parameters"]["properties"]["name"]["enum"] == list(BROWS)
+    assert function["parameters"]["properties"]["name"]["enum"] == list(FACES)
     surprised, neutral = brow_rows(page, 0), brow_rows(page, 1)
-    raised, rows = BROWS["surprised"]["browInnerUp"], round(EASE * 25)
+    raised, rows = FACES["surprised"]["browInnerUp"], round(EASE * 25)
     assert neutral.max() < 0.2 and surprised[0] < 0.2
     assert surprised[rows:].min() >= raised
     assert np.abs(np.diff(surprised)).max() < 1.6 * raised / rows
