@@ -1,5 +1,6 @@
-"""The port of figures: answered, and not to be filled with silent connections."""
+"""The port of figures: answered, and not to be filled by silent connections or long heads."""
 
+import contextlib
 import socket
 import time
 import urllib.request
@@ -41,3 +42,33 @@ def test_a_request_that_comes_letter_by_letter_ends_in_time(monkeypatch):
             except OSError:
                 closed = True
     assert closed
+
+
+def _answer(port, head):
+    with _silent(port) as connection:
+        with contextlib.suppress(OSError):
+            connection.sendall(head)
+        answer = b""
+        with contextlib.suppress(OSError):
+            while data := connection.recv(65536):
+                answer += data
+    return answer
+
+
+def test_what_is_accepted_changes_nothing(capfd):
+    registry = CollectorRegistry()
+    Counter("ico3d_visitors", "Visitors.", registry=registry).inc(7)
+    port = figures_server.serve_figures(registry, "127.0.0.1", 0)
+    for accept in (b"text/plain;version=x", b"application/openmetrics-text", b"ab," * 4000):
+        answer = _answer(port, b"GET /metrics HTTP/1.1\r\nAccept: " + accept + b"\r\n\r\n")
+        assert answer.startswith(b"HTTP/1.0 200") and b"ico3d_visitors_total 7.0" in answer
+        assert b"version=0.0.4" in answer
+    assert capfd.readouterr().err == ""
+
+
+def test_a_long_head_gets_no_answer_and_is_not_read_on(monkeypatch, capfd):
+    port = figures_server.serve_figures(CollectorRegistry(), "127.0.0.1", 0)
+    line = b"Accept: " + b"ab," * 20_000 + b"\r\n"
+    assert _answer(port, b"GET /metrics HTTP/1.1\r\n" + 100 * line + b"\r\n") == b""
+    assert _answer(port, b"GET " + b"/" * 60_000 + b" HTTP/1.1\r\n\r\n") == b""
+    assert capfd.readouterr().err == ""

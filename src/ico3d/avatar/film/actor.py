@@ -33,9 +33,9 @@ Lips = Callable[[np.ndarray, int], np.ndarray]
 """Returns speech values (T, 32), 25 rows per second, for samples (S,) and samples per second."""
 
 
-PORTRAIT = 2.8
+PORTRAIT = 3.1
 """Height of the view in a portrait of a whole person, in heights of the head."""
-CHEST = 0.7
+CHEST = 0.84
 """How far the middle of a portrait is below the middle of the head, in heights of the head."""
 
 

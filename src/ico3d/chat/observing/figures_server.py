@@ -1,35 +1,74 @@
-"""The server of an operator's figures, which strangers cannot fill with silent connections."""
+"""The server of an operator's figures, which strangers cannot fill with silent connections or long heads."""
 
 import contextlib
+import io
 import socket
 import threading
-from socketserver import ThreadingMixIn
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
-from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
-from prometheus_client import CollectorRegistry, make_wsgi_app
+from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4, CollectorRegistry, generate_latest
 
 SILENCE = 10.0
 """Seconds after which a connection without a request is closed."""
 LONGEST = 20.0
 """Seconds after which any connection is closed, such as one that sends a letter now and then."""
+LONGEST_HEAD = 16_384
+"""Bytes of a request."""
 MOST_AT_ONCE = 16
 """Connections at the same time, each of which takes a thread."""
 
 
-class _Handler(WSGIRequestHandler):
-    """Answers, and logs nothing of it."""
+class _Handler(BaseHTTPRequestHandler):
+    """Answers every path with the figures, in one format whatever is accepted; logs nothing."""
 
     timeout = SILENCE
+    registry: CollectorRegistry
+
+    def setup(self) -> None:
+        """Opens the connection, of which only so much is read."""
+        super().setup()
+        self.rfile = io.BufferedReader(_Head(self.rfile))
+
+    def do_GET(self) -> None:
+        """Answers with the figures."""
+        text = generate_latest(self.registry)
+        self.send_response(200)
+        self.send_header("Content-Type", CONTENT_TYPE_PLAIN_0_0_4)
+        self.send_header("Content-Length", str(len(text)))
+        self.end_headers()
+        self.wfile.write(text)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Logs nothing."""
 
 
-class _Server(ThreadingMixIn, WSGIServer):
-    """A thread for each connection, up to `MOST_AT_ONCE`; further ones are closed."""
+class _Head(io.RawIOBase):
+    """The first `LONGEST_HEAD` bytes of a connection; who sends more gets no answer."""
 
-    daemon_threads = True
+    def __init__(self, connection: io.BufferedIOBase):
+        self._connection, self._left = connection, LONGEST_HEAD
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Reads what has come.
+
+        Raises:
+            ConnectionAbortedError: If it is too much.
+        """
+        data = self._connection.read1(len(buffer))
+        self._left -= len(data)
+        if self._left < 0:
+            raise ConnectionAbortedError
+        buffer[: len(data)] = data
+        return len(data)
+
+
+class _Server(ThreadingHTTPServer):
+    """A thread for each connection, up to `MOST_AT_ONCE`; further ones are closed."""
 
     def __init__(self, *arguments: Any, **options: Any):
         self._places = threading.BoundedSemaphore(MOST_AT_ONCE)
@@ -82,6 +121,6 @@ def serve_figures(registry: CollectorRegistry, host: str, port: int) -> int:
         OSError: If the port cannot be opened.
     """
     kind = _Server6 if ":" in host else _Server
-    server = make_server(host, port, make_wsgi_app(registry), kind, _Handler)
+    server = kind((host, port), type("Figures", (_Handler,), {"registry": registry}))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return server.server_port
