@@ -1,7 +1,7 @@
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { StartCamera } from '../../src/bundle/manifest.ts';
-import { closeUp, figure, portrait, whole } from '../../src/stage/camera/framing.ts';
+import { closeUp, figure, portrait, talking, whole } from '../../src/stage/camera/framing.ts';
 import type { Sitter } from '../../src/stage/camera/sitter.ts';
 import { random } from '../../support/random.ts';
 
@@ -83,6 +83,19 @@ describe('the first view of somebody', () => {
     expect(height(adult, 1.6)).toBeCloseTo(0.62, 9);
     expect(height(adult, 1)).toBeCloseTo(0.62, 9);
     expect(height(adult, 390 / 844) * (390 / 844)).toBeCloseTo(0.4, 9);
+  });
+
+  test('shows the hands of somebody with a body, which speak before the chest', () => {
+    const hands = [0.2, -0.2].map((aside) => new Vector3(aside, 1.55 - 0.36, 0.3));
+    for (const aspect of [1.6, 390 / 844]) {
+      const view = talking(adult, 30)({ aspect, free: 0.85 });
+      const seen = hands.map((hand) => place(view, aspect, hand));
+      for (const [x, y] of seen) {
+        expect(Math.abs(x - 0.5)).toBeLessThan(0.5);
+        expect(y).toBeLessThan(0.85);
+      }
+      expect(place(view, aspect, adult.eyes)[1]).toBeCloseTo(0.26, 9);
+    }
   });
 
   test('ends where a head alone ends, unless the head would be cut off', () => {
