@@ -14,7 +14,7 @@ EASE = 0.4
 """Seconds of the transition between two moods."""
 FACES: dict[str, dict[str, float]] = {
     NEUTRAL: {},
-    "happy": {"browInnerUp": 0.15, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3, "smile": 0.8},
+    "happy": {"browInnerUp": 0.15, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3, "smile": 1.0},
     "surprised": {
         **{"browInnerUp": 0.6, "browOuterUpLeft": 0.6, "browOuterUpRight": 0.6, "smile": 0.2}
     },
