@@ -63,5 +63,4 @@ def test_packed_files_are_unpacked_in_one_place(python_files):
     }
     assert found == {
         ("common/unpacking/weights.py", "torch.load("),
-        ("capture/reading/arrays.py", "np.load("),  # mapped, none is packed
     }

@@ -31,8 +31,15 @@ def test_products_and_numbers_are_those_of_eight_rows():
 def test_a_convolution_counts_sixteen_channels_at_least():
     steps = [Step("Conv", ("x", "w"), "c", {}), Step("Flatten", ("c",), "y", {})]
     found = checked(steps, x=(ROWS, 1, 34), w=(1, 1, 3))
-    assert found.products == 8 * 32 * 3 * 16
+    assert found.products == 8 * 32 * 3 * 16 + 8 * 4096
     assert found.numbers == 8 * 34 + 16 * 3 + 8 * 32 + 2 * 8 * 32
+
+
+def test_each_picture_of_a_convolution_costs_something():
+    """Runtimes begin anew for it: a million of one number take seconds."""
+    steps = [Step("Conv", ("many", "w"), "c", {}), Step("Identity", ("x",), "y", {})]
+    with pytest.raises(RefusedFieldError, match="more memory or time than a talk has"):
+        checked(steps, x=SHAPE, many=(200_000, 1, 1), w=(1, 1, 1))
 
 
 def test_a_weight_counts_for_each_operator_that_takes_it():

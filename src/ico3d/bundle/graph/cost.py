@@ -30,6 +30,8 @@ MOST_NUMBERS = 1 << 24
 """Numbers that all operators of such a run take and give: 64 MiB. A weight counts for each operator
 that takes it, as runtimes copy it for each into the order that suits them, outside of the memory
 that is bounded. Without such optimising a run takes twice as long."""
+_PICTURE = 1 << 12
+"""Multiplications that each picture of a convolution costs at least: runtimes begin anew for it."""
 _LANES = 16
 """Channels that runtimes compute, and store the weights of, at once: fewer cost as much."""
 
@@ -112,6 +114,7 @@ def _count(operator: str, given: Inputs, made: Array, cost: Cost) -> None:
         # runtimes fill the channels of weights up
         wide = found[1] = (math.ceil(taken[1][0] / _LANES) * _LANES, *taken[1][1:])
         cost.products += _numbers((made.shape[0], *made.shape[2:])) * _numbers(wide)
+        cost.products += _numbers(made.shape[:1]) * _PICTURE
     elif operator in ("Gemm", "MatMul"):
         cost.products += _numbers(made.shape) * taken[0][-1]
     cost.numbers += sum(map(_numbers, found))

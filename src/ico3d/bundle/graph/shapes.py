@@ -203,16 +203,20 @@ def _gemm(given: Inputs, settings: Settings) -> Shape:
 
 def _matmul(given: Inputs, settings: Settings) -> Shape:
     one, other = _shapes(given)
-    if min(len(one), len(other)) < 2 or one[-1] != other[-2]:
+    if len(one) != 2 or len(other) != 2 or one[-1] != other[-2]:  # of many, runtimes keep lists
         raise UnfitError("shapes that do not fit")
-    return (*_broadcast(one[:-2], other[:-2]), one[-2], other[-1])
+    return one[0], other[1]
 
 
 def _conv(given: Inputs, settings: Settings) -> Shape:
     (number, channels, *sizes), (made, taken, *kernel), *added = _shapes(given)
-    count, groups = len(sizes), settings.get("group", 1)
-    fits = groups >= 1 and channels == taken * groups and not made % groups
-    if not fits or count not in (1, 2) or added not in ([], [(made,)]):
+    count = len(sizes)
+    if (
+        channels != taken
+        or settings.get("group", 1) != 1
+        or count not in (1, 2)
+        or added not in ([], [(made,)])
+    ):
         raise UnfitError("shapes that do not fit")
     if settings.get("kernel_shape", tuple(kernel)) != tuple(kernel):
         raise UnfitError("a kernel of another shape than it states")

@@ -1,11 +1,13 @@
 """Reads arrays of numbers from files that may be anybody's."""
 
 from pathlib import Path
+from struct import error as StructError
 from tokenize import TokenError
 
 import numpy as np
 
 from ico3d.common.files import check_regular
+from ico3d.common.unpacking.npy import array_head
 from ico3d.errors import CaptureError
 
 LARGEST = 1 << 28
@@ -16,6 +18,7 @@ UNREADABLE = (
     TypeError,
     SyntaxError,
     TokenError,
+    StructError,
     EOFError,
     MemoryError,
     OverflowError,
@@ -33,14 +36,17 @@ def read_numbers(file: Path) -> np.ndarray:
     """
     try:
         check_regular(file)
+        with file.open("rb") as opened:
+            shape, fortran, kind = array_head(opened)
+            begin = opened.tell()
+        if kind.kind not in "fiu":
+            raise ValueError("no numbers")
         # Mapped, an array cannot claim more memory than the file has.
-        mapped = np.load(file, mmap_mode="r", allow_pickle=False)
+        mapped = np.memmap(file, kind, "r", begin, shape, "F" if fortran else "C")
     except UNREADABLE as error:
         raise CaptureError(
             f"{file} is damaged and cannot be read: it is no array of numbers."
         ) from error
-    if not isinstance(mapped, np.ndarray) or mapped.dtype.kind not in "fiu":
-        raise CaptureError(f"{file} is damaged and cannot be read: it holds no array of numbers.")
     if mapped.nbytes > LARGEST:  # a file of zeros takes no room on a disk
         raise CaptureError(f"{file} holds more than {LARGEST >> 20} MiB of numbers: too many.")
     return np.array(mapped)

@@ -1,4 +1,4 @@
-"""The server of an operator's figures, which strangers cannot fill with silent connections or long heads."""
+"""The server of an operator's figures, which silent connections and long heads cannot fill."""
 
 import contextlib
 import io

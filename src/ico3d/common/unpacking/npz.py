@@ -7,11 +7,12 @@ import zipfile
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 from ico3d.common.files import check_regular
+from ico3d.common.unpacking.npy import array_head
 from ico3d.common.unpacking.zips import check_directory
 
 DAMAGED = (
@@ -76,21 +77,11 @@ def _members(archive: zipfile.ZipFile, names: Iterable[str] | None) -> dict[str,
 def _size(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:
     """Bytes that an array would take, as its head tells."""
     with archive.open(member) as stream:
-        shape, kind = _head(stream)
+        shape, _, kind = array_head(stream)
         left = member.file_size - stream.tell()
     if math.prod(shape) * kind.itemsize > left:  # numpy would take memory for it first
         raise ValueError(f"{member.filename} claims more than it holds")
     return math.prod(shape) * max(kind.itemsize, WIDTH)
-
-
-def _head(stream: IO[bytes]) -> tuple[tuple[int, ...], "np.dtype[Any]"]:
-    """Shape and type of an array."""
-    version = np.lib.format.read_magic(stream)
-    heads = {(1, 0): np.lib.format.read_array_header_1_0} | {
-        (2, 0): np.lib.format.read_array_header_2_0
-    }
-    shape, _, kind = heads[version](stream)
-    return shape, kind
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Any:
