@@ -52,14 +52,16 @@ def test_moods_never_jump_however_they_are_cut(changes):
 SMILE = NAMES.index("smile")
 
 
-def test_a_sentence_that_greets_smiles_and_the_next_one_does_not():
+def test_a_sentence_that_greets_smiles_and_the_next_ones_less_and_less():
     moods = Moods()
     moods.hear("Hello, I am Iris.")
     assert moods.values(rows(25))[-1, SMILE] == pytest.approx(FACES["happy"]["smile"])
     moods.hear("I live in your browser.")
-    assert not moods.values(rows(25, 1.0))[-1].any()
+    assert moods.values(rows(25, 1.0))[-1] == pytest.approx(0.5 * face_of("happy"))
+    moods.hear("It has no server.")
+    assert moods.values(rows(25, 2.0))[-1] == pytest.approx(0.25 * face_of("happy"))
     moods.hear("Perhaps; I don't know.")
-    assert moods.values(rows(25, 2.0))[-1] == pytest.approx(face_of("doubtful"))
+    assert moods.values(rows(25, 3.0))[-1] == pytest.approx(face_of("doubtful"))
 
 
 def test_a_mood_that_was_chosen_stays_whatever_is_said():

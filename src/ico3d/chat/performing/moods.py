@@ -47,11 +47,15 @@ class Moods:
         self._wanted, self._chosen = face_of(name), True
 
     def hear(self, sentence: str) -> None:
-        """Sets the mood from the next row on by the words of a sentence, unless one was chosen."""
+        """Sets the mood from the next row on by the words of a sentence, unless one was chosen.
+
+        A sentence that calls for none has half of what the one before it had: moods fade.
+        """
         if not self._chosen:
             called = called_for(sentence[:LONGEST])
             found = (WITH_GESTURES.get(gesture) for gesture in called)
-            self._wanted = face_of(next((mood for mood in found if mood), NEUTRAL))
+            mood = next((mood for mood in found if mood), None)
+            self._wanted = face_of(mood) if mood else 0.5 * self._wanted
 
     def forget(self) -> None:
         """Resets to neutral when an utterance is over; the page eases its face by itself."""

@@ -30,8 +30,9 @@ APART = (0.9, 2.0)
 """Range of the random least time in seconds from a stroke to a beat."""
 MEANT = 0.75
 """Least time in seconds from a stroke to the stroke of a gesture with a meaning."""
-LATE = 0.8
-"""Seconds after its word at which a meaning may still be shown, if there was no time before."""
+LATE, WAVING = 0.8, 1.6
+"""Seconds after its word at which a meaning may still be shown, if there was no time before; and a
+wave, which takes longer to raise than a hello lasts."""
 AGAIN = 5.0
 """Least time in seconds until the same meaning is shown again."""
 FAINT = -9.0
@@ -329,10 +330,11 @@ def _beat(draw: float) -> tuple[str, bool]:
 
 
 def _soon(index: int, stresses: tuple[Accent, ...], meant: dict[int, str]) -> list[Accent]:
-    """Accents up to `LATE` seconds after an accent, before the next one with a meaning."""
+    """Accents up to `LATE` seconds after one with a meaning, before the next one with a meaning."""
     found: list[Accent] = []
+    late = WAVING if meant[stresses[index].word] == "wave" else LATE
     for later in stresses[index + 1 :]:
-        if later.time - stresses[index].time > LATE or later.word in meant:
+        if later.time - stresses[index].time > late or later.word in meant:
             break
         found.append(later)
     return found
