@@ -190,6 +190,7 @@ async def over_http(server: McpServer) -> AsyncIterator["Client"]:
 
     from ico3d.chat.services.bounded import NoCookies
     from ico3d.chat.tools.bounded_http import BoundedTransport
+    from ico3d.chat.tools.mcp_requests import asked_nothing
 
     headers = filled_in(server.headers, server.where)
     limits = httpx2.Timeout(server.seconds, read=None)  # a stream is silent between calls
@@ -202,7 +203,7 @@ async def over_http(server: McpServer) -> AsyncIterator["Client"]:
             transport=sending,
             cookies=NoCookies(),
         ) as http,
-        Client(streamable_http_client(server.url, http_client=http)) as client,
+        Client(asked_nothing(streamable_http_client(server.url, http_client=http))) as client,
     ):
         yield unvalidated(client)
 
@@ -218,11 +219,13 @@ async def as_program(server: McpServer) -> AsyncIterator["Client"]:
     from mcp import Client, StdioServerParameters
     from mcp.client.stdio import stdio_client
 
+    from ico3d.chat.tools.mcp_requests import asked_nothing
+
     environment = filled_in(server.environment, server.where)
     command, *arguments = server.command
     parameters = StdioServerParameters(command=command, args=arguments, env=environment)
     with Path(os.devnull).open("w") as nowhere:  # what it says there may quote visitors and keys
-        async with Client(stdio_client(parameters, errlog=nowhere)) as client:
+        async with Client(asked_nothing(stdio_client(parameters, errlog=nowhere))) as client:
             yield unvalidated(client)
 
 
