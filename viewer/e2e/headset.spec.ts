@@ -122,6 +122,9 @@ describe('somebody on a skeleton, met by headset', () => {
     const late = await page.evaluate(async (step) => {
       const { stage, acting, skinned, head, splats } = window.ico3d!;
       const generators = [skinned!.generator, head!.generator];
+      const { count, displacements } = head!.generator.parts[0]!;
+      const moves = (i: number) => displacements.some((value, at) => value !== 0 && Math.floor(at / 3) % count === i);
+      const still = Array.from({ length: count }, (_, i) => i).findIndex((i) => !moves(i)); // whatever the face does
       const [advance, draw, { rotations, root }] = [stage.advance, stage.draw, acting!.pose];
       const places: number[][] = [];
       let pictures = 0;
@@ -132,7 +135,7 @@ describe('somebody on a skeleton, met by headset', () => {
       };
       stage.draw = () => {
         draw.call(stage);
-        places.push(generators.map((generator) => splats(generator).centres[0]! - step * (pictures % 3)));
+        places.push(generators.map((generator, i) => splats(generator).centres[i === 0 ? 0 : 3 * still]! - step * (pictures % 3)));
       };
       while (places.length < 7) await new Promise((resolve) => setTimeout(resolve, 20));
       Object.assign(stage, { advance, draw });
@@ -140,8 +143,7 @@ describe('somebody on a skeleton, met by headset', () => {
       return generators.map((_, i) => Math.max(...places.slice(1).map((at) => Math.abs(at[i]! - places[1]![i]!))));
     }, STEP);
     console.log(`farthest from where it should be, of body and head: ${late.map((far) => far.toExponential(1)).join(', ')} m`);
-    expect(late[0]).toBeLessThan(1e-3 * STEP);
-    expect(late[1]).toBeLessThan(0.05 * STEP); // a blink moves skin by a millimetre
+    expect(Math.max(...late)).toBeLessThan(1e-3 * STEP);
     await isLookedAt(page);
     await quit(page);
   });

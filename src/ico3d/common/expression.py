@@ -18,6 +18,9 @@ EYE_NAMES = (
 )
 """ARKit names of the seven eye and brow values, 0 to 1, after the speech values."""
 
+FACE_NAMES = (*EYE_NAMES, "smile")
+"""The values after those of speech, the last of which not every head knows."""
+
 SMILES = ("mouthSmileLeft", "mouthSmileRight")
 """ARKit names of the blendshapes whose mean is the smile, which heads that know it have last."""
 

@@ -11,7 +11,7 @@ import torch
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.parts.trained_on import check_told
-from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE, TURN_SIZE, EyeRange
+from ico3d.common.expression import EYE_NAMES, FACE_NAMES, SPEECH_SIZE, TURN_SIZE, EyeRange
 from ico3d.common.files import json_of, write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import (
@@ -84,7 +84,7 @@ class TrainedHead:
     @property
     def smiles(self) -> bool:
         """Whether the last value of an expression is a smile."""
-        return self.adaptor is not None and len(self.eyes.rest) > len(EYE_NAMES)
+        return self.adaptor is not None and len(self.eyes.rest) == len(FACE_NAMES)
 
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
@@ -215,7 +215,8 @@ def _eyes(values: dict | None) -> EyeRange:
     if values is None:
         return EyeRange()
     rows = np.array([values["rest"], values["most"]], np.float64)  # (2, 7 or 8)
-    whole = rows.shape in ((2, len(EYE_NAMES)), (2, len(EYE_NAMES) + 1)) and np.isfinite(rows).all()
+    known = rows.shape in ((2, len(EYE_NAMES)), (2, len(FACE_NAMES)))
+    whole = known and np.isfinite(rows).all()
     if not whole or (rows[1] < rows[0]).any():
         raise ValueError("eyes must be seven or eight values at rest, and others not lower")
     return EyeRange(tuple(rows[0].tolist()), tuple(rows[1].tolist()))

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from ico3d.common.camera import Camera
-from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
+from ico3d.common.expression import FACE_NAMES, SPEECH_SIZE
 from ico3d.common.spread import spread
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack
 from ico3d.head.model import HeadModel
@@ -102,5 +102,5 @@ def _named_inputs(model: HeadModel, track: ExpressionTrack) -> dict[str, int]:
         return {}
     if isinstance(track, BlendshapeTrack):
         return {name: index for index, name in enumerate(track.names)}
-    names = (*EYE_NAMES, "smile")[: track.size - SPEECH_SIZE]
+    names = FACE_NAMES[: track.size - SPEECH_SIZE]
     return {name: SPEECH_SIZE + index for index, name in enumerate(names)}

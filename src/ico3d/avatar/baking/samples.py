@@ -12,6 +12,7 @@ from ico3d.avatar.baking.importance import logit_importance
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.espeak.speech import synthesize
+from ico3d.common.expression import SPEECH_SIZE, expression_rows
 from ico3d.common.spread import spread
 from ico3d.head.expressions import FEATURE_RATE, ExpressionTrack
 from ico3d.head.model import HeadModel
@@ -104,8 +105,8 @@ def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -
     times = np.arange(len(lips)) / FEATURE_RATE
     smile = 0.5 - 0.5 * np.cos(2 * np.pi * times / _SMILE)  # (T,)
     face = np.column_stack([EyeBehaviour(seed).values(times), smile])  # (T, 8)
-    driven = np.concatenate([lips, face[:, : len(head.eyes.rest)]], 1)  # (T, B)
-    return head.recorded(driven.astype(np.float32))
+    rest = np.zeros(SPEECH_SIZE + len(head.eyes.rest), np.float32)  # (B,)
+    return head.recorded(expression_rows(rest, lips, face, SPEECH_SIZE))
 
 
 def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:

@@ -1,30 +1,15 @@
 """Reads arrays of numbers from files that may be anybody's."""
 
 from pathlib import Path
-from struct import error as StructError
-from tokenize import TokenError
 
 import numpy as np
 
 from ico3d.common.files import check_regular
-from ico3d.common.unpacking.npy import array_head
+from ico3d.common.unpacking.npy import DAMAGED, array_head
 from ico3d.errors import CaptureError
 
 LARGEST = 1 << 28
 """Bytes of an array: eleven million points."""
-UNREADABLE = (
-    OSError,
-    ValueError,
-    TypeError,
-    SyntaxError,
-    TokenError,
-    StructError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    RecursionError,
-)
-"""What NumPy raises for files whose header is damaged or claims more than the file has."""
 
 
 def read_numbers(file: Path) -> np.ndarray:
@@ -43,7 +28,7 @@ def read_numbers(file: Path) -> np.ndarray:
             raise ValueError("no numbers")
         # Mapped, an array cannot claim more memory than the file has.
         mapped = np.memmap(file, kind, "r", begin, shape, "F" if fortran else "C")
-    except UNREADABLE as error:
+    except (OSError, *DAMAGED) as error:
         raise CaptureError(
             f"{file} is damaged and cannot be read: it is no array of numbers."
         ) from error

@@ -2,11 +2,9 @@
 
 import numpy as np
 
-from ico3d.common.expression import EYE_NAMES
+from ico3d.common.expression import FACE_NAMES
 from ico3d.motion.composing.lexicon import called_for
 
-NAMES = (*EYE_NAMES, "smile")
-"""What moods move: all values of a face that speech does not."""
 NEUTRAL = "neutral"
 LONGEST = 1_000
 """Letters of a sentence that are looked at."""
@@ -16,7 +14,10 @@ FACES: dict[str, dict[str, float]] = {
     NEUTRAL: {},
     "happy": {"browInnerUp": 0.15, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3, "smile": 1.0},
     "surprised": {
-        **{"browInnerUp": 0.6, "browOuterUpLeft": 0.6, "browOuterUpRight": 0.6, "smile": 0.2}
+        "browInnerUp": 0.6,
+        "browOuterUpLeft": 0.6,
+        "browOuterUpRight": 0.6,
+        "smile": 0.2,
     },
     "serious": {"browDownLeft": 0.35, "browDownRight": 0.35},
     "worried": {"browInnerUp": 0.6, "browDownLeft": 0.15, "browDownRight": 0.15},
@@ -69,7 +70,7 @@ class Moods:
             times: (n,) times of the rows in seconds, ascending over all calls within an utterance.
 
         Returns:
-            (n, 8) float32, in the order of `NAMES`.
+            (n, 8) float32, in the order of `FACE_NAMES`.
         """
         if len(times) and self._to is not self._wanted:
             self._from = self._at(times[:1])[0]
@@ -83,6 +84,6 @@ class Moods:
 
 
 def face_of(mood: str) -> np.ndarray:
-    """(8,) float32 values that a mood adds, in the order of `NAMES`."""
+    """(8,) float32 values that a mood adds, in the order of `FACE_NAMES`."""
     added = FACES[mood]
-    return np.array([added.get(name, 0.0) for name in NAMES], np.float32)
+    return np.array([added.get(name, 0.0) for name in FACE_NAMES], np.float32)

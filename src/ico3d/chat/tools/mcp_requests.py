@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
+import anyio
 from mcp.client import Transport
 from mcp.shared.message import SessionMessage
 from mcp_types import JSONRPCRequest
@@ -52,9 +53,10 @@ class _Answers:
         return self
 
     async def __anext__(self) -> SessionMessage | Exception:
-        while _asks(message := await anext(self._stream)):
-            pass
-        return message
+        try:
+            return await self.receive()
+        except anyio.EndOfStream as end:
+            raise StopAsyncIteration from end
 
     async def __aenter__(self) -> "_Answers":
         await self._stream.__aenter__()

@@ -2,12 +2,18 @@
 
 import io
 import struct
+import tokenize
 from typing import IO, Any
 
 import numpy as np
 
 LONGEST = 10_000
 """Bytes of a head, as numpy has it: it looks only after it has read and decoded all of it."""
+DAMAGED = (
+    *(ValueError, EOFError, LookupError, TypeError, AttributeError, ArithmeticError),
+    *(RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, struct.error),
+)
+"""What numpy raises for damaged files: it reads an array's head as Python."""
 _LENGTHS = {(1, 0): ("<H", np.lib.format.read_array_header_1_0)} | {
     (2, 0): ("<I", np.lib.format.read_array_header_2_0)
 }
@@ -25,7 +31,7 @@ def array_head(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, "np.dtype[Any]
 
     Raises:
         ValueError: If it is longer than `LONGEST`, or none.
-        Exception: What else numpy raises for a damaged one, as it reads heads as Python.
+        Exception: Any of `DAMAGED` for a damaged one.
     """
     version = np.lib.format.read_magic(stream)
     if version not in _LENGTHS:

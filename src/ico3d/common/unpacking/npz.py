@@ -1,8 +1,6 @@
 """Reads the arrays of an .npz file, which may unpack to a thousand times its size."""
 
 import math
-import struct
-import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -12,15 +10,11 @@ from typing import Any
 import numpy as np
 
 from ico3d.common.files import check_regular
-from ico3d.common.unpacking.npy import array_head
+from ico3d.common.unpacking import npy
 from ico3d.common.unpacking.zips import check_directory
 
-DAMAGED = (
-    *(ValueError, EOFError, LookupError, TypeError, AttributeError, ArithmeticError),
-    *(RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, struct.error),
-    *(zipfile.BadZipFile, zlib.error),
-)
-"""What numpy and zipfile raise for damaged files; numpy reads an array's header as Python."""
+DAMAGED = (*npy.DAMAGED, zipfile.BadZipFile, zlib.error)
+"""What numpy and zipfile raise for damaged files."""
 WIDTH = 8
 """Bytes that a number counts at least: what is stored in one becomes a float64."""
 
@@ -77,7 +71,7 @@ def _members(archive: zipfile.ZipFile, names: Iterable[str] | None) -> dict[str,
 def _size(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:
     """Bytes that an array would take, as its head tells."""
     with archive.open(member) as stream:
-        shape, _, kind = array_head(stream)
+        shape, _, kind = npy.array_head(stream)
         left = member.file_size - stream.tell()
     if math.prod(shape) * kind.itemsize > left:  # numpy would take memory for it first
         raise ValueError(f"{member.filename} claims more than it holds")
