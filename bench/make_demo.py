@@ -37,7 +37,7 @@ from ico3d.common.files import write_atomic
 from ico3d.motion.recorded.cut import CUTS, to_toml
 from ico3d.rig.body_track import track_file, write_body_track
 from ico3d.rig.rig import Rig
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.rigs import cameras_of
 from ico3d.studio.studio import Studio

@@ -30,7 +30,7 @@ from ico3d.motion.gestures.library import library
 from ico3d.motion.living import living
 from ico3d.motion.person import Person
 from ico3d.rig.rig import Rig
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 
 SENTENCES = (
     "Hello, and welcome! I am very glad that you are here.",

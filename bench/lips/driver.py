@@ -31,7 +31,7 @@ from ico3d.speech.training.augment import recorded
 from ico3d.studio.acting.articulation import BILABIALS
 from ico3d.studio.acting.performance import Performance, perform
 from ico3d.studio.acting.sentences import SENTENCES
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person.subject import Subject
 
 CLOSED = 0.25

@@ -19,7 +19,7 @@ from ico3d.cli import run_script
 from ico3d.common.camera import Camera, look_at
 from ico3d.studio.acting.gaze import looking
 from ico3d.studio.acting.performance import Performance
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.rigs import DISTANCE
 from ico3d.studio.studio import Studio, backdrop

@@ -19,7 +19,7 @@ from ico3d.cli import run_script
 from ico3d.common.camera import Camera, look_at
 from ico3d.studio.acting.acting import pose
 from ico3d.studio.acting.gestures import act
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person.subject import Subject
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.studio import Studio, backdrop

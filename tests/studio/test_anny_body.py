@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material, Subject
 from support.needs import needs

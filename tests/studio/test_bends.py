@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person import bends
-from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.subject import Material
 from support.recordings import synthetic_people

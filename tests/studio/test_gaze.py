@@ -5,7 +5,7 @@ import pytest
 
 from ico3d.studio.acting.gaze import KAPPA, looking
 from ico3d.studio.acting.performance import Performance
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.picture.eyeball import eye_rows
 from support.needs import needs

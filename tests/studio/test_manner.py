@@ -7,7 +7,7 @@ import pytest
 
 from ico3d.studio.acting.manner import GLAD, MANNERS, mannered
 from ico3d.studio.acting.performance import SOUND_RATE, perform
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from support.needs import needs
 
 pytestmark = needs("anny")

@@ -7,7 +7,7 @@ from ico3d.common.espeak.speech import Phoneme
 from ico3d.common.expression import EYE_NAMES
 from ico3d.studio.acting.articulation import LEAST_CLOSED, articulate, closure
 from ico3d.studio.acting.performance import PAUSE, SOUND_RATE, _glances, _speak, perform
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from support.shared import SUBJECTS
 
 NAMES = ["sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou"]

@@ -14,8 +14,8 @@ from ico3d.errors import CaptureError, SettingsError
 from ico3d.studio.acting.acting import pose
 from ico3d.studio.acting.gestures import act
 from ico3d.studio.acting.limbs import reach, split_twist
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person import bends
-from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture import paint

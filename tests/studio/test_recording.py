@@ -10,7 +10,7 @@ import pytest
 from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError, SettingsError
 from ico3d.studio import recording
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.points import surface_points
 from ico3d.studio.recording import choose_views, record
 from support.needs import needs

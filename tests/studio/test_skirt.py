@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from ico3d.capture.formats import open_capture
 from ico3d.errors import SettingsError
 from ico3d.studio.acting.performance import Performance
+from ico3d.studio.choice import load_subject
 from ico3d.studio.dress import fabric
 from ico3d.studio.dress.fabric import THICKNESS, Cloth, Course, hung
 from ico3d.studio.dress.limbs import limbs_of, trunk_section, waist_height
 from ico3d.studio.dress.skirt import COLUMNS, cut_skirt
 from ico3d.studio.dress.wearing import dressed, tucked_in
-from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture import paint

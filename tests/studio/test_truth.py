@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError
 from ico3d.rig.body_track import write_body_track
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.recording import Recording, record
 from ico3d.studio.truth import true_joints, true_track
 from support.recordings.synthetic_bodies import write_body

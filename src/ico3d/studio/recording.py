@@ -27,8 +27,8 @@ from ico3d.studio.acting.gaze import GAZES, looking
 from ico3d.studio.acting.gestures import MOTIONS
 from ico3d.studio.acting.manner import MANNERS, mannered
 from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
+from ico3d.studio.choice import load_subject
 from ico3d.studio.dress.wearing import GARMENTS, dressed
-from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.subject import Subject
 from ico3d.studio.person.traits.names import TRAITS, TraitName
 from ico3d.studio.picture.lamps import STUDIOS

@@ -16,7 +16,7 @@ from ico3d.rig.quaternions import continuous, from_matrix
 from ico3d.rig.rig import Rig
 from ico3d.studio.acting.embody import embodied
 from ico3d.studio.acting.performance import perform
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.person.subject import GARMENTS, Material, Subject
 from ico3d.studio.recording import Recording
 

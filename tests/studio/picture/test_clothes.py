@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from ico3d.studio.dress.tailoring import FOLD, HEM_RIB, RIB, _even, tailored
-from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.edges import open_loops, without_covered_neck
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture.clothes.clothed import STEEPEST, tilted
 from ico3d.studio.picture.clothes.knitwear import jumper
 from ico3d.studio.picture.clothes.relief import RAISED, ROW, WALE, Weave, folds, knit_height, stitch
-from support.recordings import synthetic_bodies
+from support.recordings.sleeves import sleeved
 
 RINGS, SIDES, RADIUS = 30, 16, 0.05
 
@@ -22,35 +21,7 @@ RINGS, SIDES, RADIUS = 30, 16, 0.05
 @pytest.fixture(scope="module")
 def sleeve(tmp_path_factory):
     """Somebody who wears nothing but an open sleeve from the left shoulder to the wrist."""
-    path = synthetic_bodies.write_body(tmp_path_factory.mktemp("people") / "tubes.npz")
-    person = load_subject(str(path), whole=True)
-    bones = person.skeleton
-    assert bones is not None
-    start, elbow, end = (
-        bones.at[bones.index(f"{n}.L")] for n in ("upperarm01", "lowerarm01", "wrist")
-    )
-    along = np.linspace(0, 1, RINGS)[:, None]
-    middle = np.where(along < 0.5, start + 2 * along * (elbow - start), 0)
-    middle += np.where(along >= 0.5, elbow + (2 * along - 1) * (end - elbow), 0)
-    turn = 2 * np.pi * np.arange(SIDES) / SIDES
-    frame = np.linalg.svd((end - start)[None])[2][1:]  # (2, 3) across the arm
-    ring = RADIUS * np.stack([np.cos(turn), np.sin(turn)], 1) @ frame
-    points = (middle[:, None] + ring).reshape(-1, 3)
-    row, column = (i.ravel() for i in np.mgrid[: RINGS - 1, :SIDES])
-    a, b = row * SIDES + column, row * SIDES + (column + 1) % SIDES
-    faces = np.concatenate([np.stack([a, b, a + SIDES], 1), np.stack([b, b + SIDES, a + SIDES], 1)])
-    weights = np.zeros((len(points), len(bones.names)), np.float32)
-    lower = np.repeat(np.clip((along[:, 0] - 0.5) * 8 + 0.5, 0, 1), SIDES)
-    weights[:, bones.index("upperarm01.L")] = 1 - lower
-    weights[:, bones.index("lowerarm01.L")] = lower
-    return replace(
-        person,
-        vertices=points.astype(np.float32),
-        faces=faces.astype(np.int32),
-        materials=np.full(len(faces), Material.CLOTH, np.uint8),
-        corner_uv=np.zeros((len(faces), 3, 2), np.float32),
-        skeleton=replace(bones, weights=weights),
-    )
+    return sleeved(tmp_path_factory.mktemp("people"), RINGS, SIDES, RADIUS)
 
 
 def test_relief_tilts_a_surface_as_its_height_rises():
@@ -124,6 +95,11 @@ def test_a_plain_jumper_has_one_colour_and_is_as_bright_from_near_as_from_far(pi
     assert min(heights) >= 0 and max(heights) <= RAISED
     fine = pixel == 0.006  # a column of stitches is as wide as two such pixels
     assert (np.ptp(tones) < 0.08) == fine and (np.ptp(heights) < 0.0002) == fine
+
+
+def test_a_jumper_that_hangs_in_folds_has_none_painted(sleeve):
+    assert tailored(sleeve).loose.max() > 0.002
+    assert tailored(replace(sleeve, draped=True)).loose.max() == 0
 
 
 def test_folds_fade_where_their_pattern_is_squeezed():

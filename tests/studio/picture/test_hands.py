@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from ico3d.studio.person.choice import load_subject
+from ico3d.studio.choice import load_subject
 from ico3d.studio.picture.hands import (
     ALONG,
     FINE,

@@ -28,7 +28,7 @@ from ico3d.splat.initial import spacing
 
 SPARE = 3
 """Factor by which more points are drawn than wanted, as those that no camera sees are left out."""
-DENSER, SHORT, MOST_DENSE = 1.5, 0.08, 3.0
+DENSER, SHORT, MOST_DENSE = 1.5, 0.12, 5.0
 """Points per area grow with this power of the pixels per metre of the pictures, and with the
 inverse of the length of a bone where that is shorter than `SHORT` metres, up to a factor. Jeans
 that are seen from afar had four tenths of all Gaussians, hands a twelfth."""

@@ -137,7 +137,7 @@ def _follow(state, velocity, pins, ends, masses, pairs, lengths, compliance, rad
             velocity[i, 1] -= GRAVITY * step
             for axis in range(3):
                 state[i, axis] += velocity[i, axis] * step
-        _hold(state, pairs, lengths, compliance, inverse, step)
+        hold(state, pairs, lengths, compliance, inverse, step)
         for c in range(ends.shape[1]):
             _push(state, old, pinned, before[c], ends[s, c], radii[c])
         for i in range(state.shape[0]):
@@ -148,8 +148,17 @@ def _follow(state, velocity, pins, ends, masses, pairs, lengths, compliance, rad
 
 
 @kernel(fast=False)
-def _hold(state, pairs, lengths, compliance, inverse, step):
-    """Brings pairs of points back to their distance, one after the other."""
+def hold(state, pairs, lengths, compliance, inverse, step):
+    """Brings pairs of points back to their distance, one after the other, in place.
+
+    Args:
+        state: (N, 3) float64 places, metres.
+        pairs: (E, 2) int32 points that each spring joins.
+        lengths: (E,) lengths at rest, metres.
+        compliance: (E,) compliances, metres per newton.
+        inverse: (N,) inverse masses, per kilogram; 0 for what is held.
+        step: Seconds.
+    """
     for e in range(pairs.shape[0]):
         i, j = pairs[e, 0], pairs[e, 1]
         x, y, z = (

@@ -101,7 +101,7 @@ def tailored(subject: Subject) -> Tailored:
     )
 
 
-def _limb_axes(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
+def limb_axes(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     """(V, 3) unit direction of each vertex's limb, and (V, 3) the shoulder on its side."""
     up = np.tile([0.0, 1.0, 0.0], (len(subject.vertices), 1))
     centre, bones = np.zeros_like(up), subject.skeleton
@@ -119,7 +119,7 @@ def _limb_axes(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
 
 def _fold_places(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     """Places in a pattern of folds, (V, 3): across, along and across; and limbs' axes (V, 3)."""
-    vertices, (axis, centre) = subject.vertices, _limb_axes(subject)
+    vertices, (axis, centre) = subject.vertices, limb_axes(subject)
     knit = np.zeros(len(vertices))
     knit[subject.faces[subject.materials == Material.CLOTH]] = 1
     along = ((vertices - centre) * axis).sum(axis=1)  # (V,)
@@ -241,5 +241,5 @@ def _loose(subject: Subject, fields: np.ndarray) -> np.ndarray:
                 away = at[chosen] - bones.at[bones.index(f"{joint}.{side}")]
                 depth[chosen] += deep * np.exp(-((away**2).sum(axis=1)) / (2 * wide**2))
     ribbed = np.clip(hem[knit] - 0.8, 0, 1)
-    depth[knit] *= ribbed
+    depth[knit] *= 0.0 if subject.draped else ribbed  # a draped jumper has folds of its own
     return depth

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from ico3d.studio.person.subject import Material, Subject
 
-UNDER = 0.022
+UNDER = 0.016
 """Metres below a collar at which skin of the neck is left out: bending cloth would let it show."""
 NECK = 0.13
 """Largest distance in metres of such skin from the collar, so that hands are none."""

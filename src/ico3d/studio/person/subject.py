@@ -127,6 +127,7 @@ class Subject:
         skeleton: Skeleton of a whole person, whose vertices are given in the skeleton's rest pose;
             None for a bust.
         strands: Hair that is drawn strand by strand; None if only meshes stand for hair.
+        draped: Whether the mesh of the jumper hangs in folds, so that no relief need paint them.
     """
 
     name: str
@@ -149,6 +150,7 @@ class Subject:
     licence: str
     skeleton: Skeleton | None = None
     strands: Strands | None = None
+    draped: bool = False
 
     def posed(self, weights: np.ndarray) -> np.ndarray:
         """Vertices (V, 3) float32 for blendshape weights (K,), metres."""

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.studio.person.growing.skull import skull_of
-from ico3d.studio.person.growing.tied import parting
 from ico3d.studio.person.hair import strand_frames
 from ico3d.studio.person.subject import Subject
 from ico3d.studio.person.traits.beard import beard_share, bump
@@ -23,8 +22,6 @@ Everything outside of the map counts as lit.
 """
 SCALP_REACH = 0.026
 """Distance in metres from the hairline over which roots come to cover the skin."""
-PARTED, PARTING_WIDTH = 0.38, 0.0035
-"""Share of the roots' cover that is missing in the parting, and half of its width, metres."""
 
 
 @dataclass(frozen=True)
@@ -124,8 +121,4 @@ def _scalp(subject: Subject) -> np.ndarray:
     if skull is None:
         return np.zeros(len(subject.vertices))
     depth = skull.inside_hairline(subject.vertices)
-    covered = np.clip(0.22 + depth / SCALP_REACH, 0, 1) ** 1.5
-    if not subject.male:
-        aside, opened = parting(skull, subject.vertices)
-        covered *= 1 - PARTED * opened * np.exp(-((aside / PARTING_WIDTH) ** 2))
-    return covered
+    return np.clip(0.22 + depth / SCALP_REACH, 0, 1) ** 1.5

@@ -18,14 +18,12 @@ LOOSE = 20000
 """Strands of long hair that falls on the shoulders."""
 TAIL = 3600
 """Strands in a tail."""
-BABY_HAIRS, FLYAWAYS, WISP = 2600, 260, 22
-"""Short hairs at the hairline of tied hair, strands that leave its surface, strands of a wisp."""
+BABY_HAIRS, FLYAWAYS = 2600, 160
+"""Short hairs at the hairline of tied hair, and strands that leave its surface."""
 RADIUS = 0.00013
 """Half of a strand's thickness in metres: thicker than real hair, which is more numerous."""
 EDGE = 0.015
 """Metres over which the hairline thins out: the strands there are fewer and finer."""
-GAP = 0.0008
-"""Half of the width of the parting, metres."""
 AWAY = 0.03
 """Hair farther than this from the skin hangs in a tail, metres."""
 
@@ -55,7 +53,7 @@ def with_hair(subject: Subject, loose: bool = False) -> Subject:
         return subject
     random = np.random.default_rng(7)
     count = SHORT if subject.male and not loose else LOOSE if loose else LONG
-    corners, parts = _roots(subject, skull, count, not (loose or subject.male), random)
+    corners, parts = _roots(subject, skull, count, random)
     roots = np.einsum("nk,nkc->nc", parts, subject.vertices[corners])
     grown = []
     if loose:
@@ -95,7 +93,7 @@ def _escaped(
     combed: styles.Paths,
     random: np.random.Generator,
 ) -> list[Strands]:
-    """What tied hair of roots (N, 3), (N, 3) does not hold: baby hairs, wisps and flyaways."""
+    """What tied hair of roots (N, 3), (N, 3) does not hold: baby hairs and flyaways."""
     roots = np.einsum("nk,nkc->nc", parts, subject.vertices[corners])
     ways = styles.unit(combed.points[:, 2] - combed.points[:, 0])
     skin, at, places = _scalp(subject, skull, 20 * BABY_HAIRS, random)
@@ -103,13 +101,6 @@ def _escaped(
     kept = np.flatnonzero(random.random(len(places)) < dense)[:BABY_HAIRS]
     like = KDTree(roots).query(places[kept])[1]
     groups = [(skin[kept], at[kept], wisps.baby(skull, places[kept], ways[like], random))]
-    x, _, z = (places / skull.scale).T
-    turn, inside = np.arctan2(x, z + 0.005), skull.inside_hairline(places)
-    for index, (side, azimuth, depth, _) in enumerate(wisps.FRAMING):
-        away = np.hypot((turn - side * azimuth) * 0.07, inside - depth)
-        kept = np.argsort(away)[:WISP]
-        paths = wisps.framing(skull, places[kept], np.full(WISP, index), random)
-        groups.append((skin[kept], at[kept], paths))
     high = np.flatnonzero((combed.depth[:, -4] < 0.3) & (roots[:, 1] > 0.03 * skull.scale))
     kept = random.choice(high, FLYAWAYS)
     groups.append((corners[kept], parts[kept], wisps.flyaways(skull, combed.points[kept], random)))
@@ -160,19 +151,12 @@ def _of(
 
 
 def _roots(
-    subject: Subject, skull: Skull, count: int, gap: bool, random: np.random.Generator
+    subject: Subject, skull: Skull, count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (N, 3) and places on them (N, 3): evenly over the scalp, thinner at its edge.
-
-    With a `gap`, the scalp shows in the parting.
-    """
-    corners, parts, places = _scalp(subject, skull, 3 * count if gap else 2 * count, random)
+    """Triangles (N, 3) and places on them (N, 3): evenly over the scalp, thinner at its edge."""
+    corners, parts, places = _scalp(subject, skull, 2 * count, random)
     depth = skull.inside_hairline(places) + 0.004 * _ripple(places)
     dense = np.clip(0.35 + depth / EDGE, 0, 1) ** 1.5  # (N,)
-    if gap:  # roots along the parting are seen, so they must be as dense as real ones
-        aside, opened = tied.parting(skull, places)
-        beside = opened * np.exp(-np.abs(aside) / 0.009)
-        dense *= (0.5 + 0.5 * beside) * (1 - opened * (np.abs(aside) < GAP))
     kept = np.flatnonzero(random.random(len(places)) < dense)[:count]
     return corners[kept], parts[kept]
 

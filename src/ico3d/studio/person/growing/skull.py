@@ -10,7 +10,7 @@ from ico3d.studio.person.subject import Material, Subject
 
 HAIRLINE_ANGLE = np.radians([0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 84.0, 100.0, 130.0, 180.0])
 HAIRLINE_HEIGHT = np.array(
-    [0.0570, 0.0580, 0.0555, 0.0470, 0.0300, 0.0050, -0.0200, 0.010, -0.050, -0.072]
+    [0.0515, 0.0525, 0.0500, 0.0425, 0.0285, 0.0050, -0.0200, 0.010, -0.050, -0.072]
 )
 """Height of the hairline above the eyes in metres, for each of `HAIRLINE_ANGLE` from the front."""
 HALF_WIDTH = 0.0677

@@ -1,4 +1,4 @@
-"""Long hair that is combed over the head from a parting and tied into a tail."""
+"""Long hair that is combed back over the head and tied into a tail."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -8,19 +8,11 @@ from ico3d.studio.person.growing.styles import Paths, clumped, smooth, unit, wav
 
 POINTS = 18
 """Points of a strand from its root to where the hair is tied, and of one in the tail."""
-PARTING = 0.009
-"""Distance of the parting from the middle of the head, to the person's left, metres."""
-PARTING_END = (-0.035, 0.005)
-"""Where the parting fades and where it is whole: metres in front of the middle of the head."""
+MIDDLE, AWAY = 0.18, 0.45
+"""How far from the middle of the head hair is combed aside, and how much, as shares of the head's
+radius."""
 LOCKS, FINE_LOCKS, TAIL_LOCKS = 170, 520, 60
 """Locks on a head, the smaller ones in them, and those of a tail."""
-
-
-def parting(skull: Skull, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Metres (N,) from the parting, positive on the person's left, and how open it is, 0 to 1."""
-    x, _, z = ((places - skull.centre) / skull.scale).T
-    line = PARTING + 0.0009 * np.sin(95 * z) + 0.0005 * np.sin(230 * z + 1.0)
-    return skull.scale * (x - line), smooth(*PARTING_END, z)
 
 
 def locks(roots: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -41,14 +33,12 @@ def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Gen
     angle = np.arccos(np.clip(start @ end, -1, 1))[:, None]  # (N, 1)
     one, two = np.sin((1 - t) * angle), np.sin(t * angle)  # (N, K)
     path = unit(one[..., None] * start[:, None] + two[..., None] * end)
-    aside, opened = parting(skull, roots)
-    side = np.sign(aside + 1e-9)
+    side = np.tanh(start[:, 0] / MIDDLE)  # (N,) -1 on the right, 1 on the left
     lock, edge = locks(roots, LOCKS)
     fine, fine_edge = locks(roots, FINE_LOCKS)
     front = smooth(-0.2, 0.7, start[:, 2]) * smooth(0.0, 0.6, start[:, 1])  # (N,)
     combed = _drift(start) + 0.10 * random.standard_normal(LOCKS)[lock]
-    away = 0.55 + 0.22 * opened * np.exp(-np.abs(aside) / (0.02 * s))
-    sweep = np.stack([side * away, -0.20 + 0.10 * combed, 0.12 + 0.06 * combed], 1)
+    sweep = np.stack([AWAY * side, -0.20 + 0.10 * combed, 0.12 + 0.06 * combed], 1)
     bow = np.sin(np.pi * t**0.85) * (1 - 0.35 * t)
     path = path + (front[:, None] * bow)[..., None] * sweep[:, None]
     # Beside and behind, locks cross the shortest way a little up or down.
@@ -56,7 +46,7 @@ def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Gen
     path = unit(path)
     level = random.random(count) ** 0.45  # 1: on the surface
     top = smooth(0.2, 0.9, path[..., 1]) * np.exp(-((path[..., 0] / 0.5) ** 2))  # (N, K)
-    full = 0.0042 + 0.0042 * top * np.sin(np.pi * t) ** 0.5
+    full = 0.0042 + 0.0085 * top * np.sin(np.pi * t) ** 0.5
     full = full + 0.004 * smooth(0.2, 0.8, t)[None]
     full = full * (1 + 0.05 * random.standard_normal(LOCKS)[lock] - 0.06 * edge)[:, None]
     rise = 1 - np.exp(-4 * t)
@@ -64,8 +54,7 @@ def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Gen
     height = above[:, None] * np.exp(-6 * t) + s * 0.0008
     height += s * rise * full * (0.15 + 0.85 * level[:, None])
     points = skull.on(path, height)
-    for half in (side > 0, side < 0):  # locks of one side have nothing of the other
-        points[half] = clumped(points[half], 0.12, FINE_LOCKS // 2, 0.42)
+    points = clumped(points, 0.12, FINE_LOCKS, 0.42)
     points += 0.0005 * waves(count, POINTS, 0.4, random)
     disc = 0.009 * _disc(count, random)  # (N, 3)
     into = smooth(0.72, 1.0, t)[None, :, None]

@@ -9,7 +9,7 @@ from ico3d.studio.picture.textures import grain, noise, smoothstep, visible
 
 THREAD = (0.42, 0.235, 0.085)
 """Albedo of the stitches on jeans."""
-BETWEEN, MEAN_STITCH = 0.42, 0.52
+BETWEEN, MEAN_STITCH = 0.22, 0.52
 """How much darker wool is between stitches, and the mean height of a stitch, 0 to 1."""
 FUZZ = 0.22
 """Light that the hairs of wool send back at grazing angles."""

@@ -11,12 +11,12 @@ from typing import NamedTuple
 from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.studio.picture.textures import smoothstep, visible
 
-WALE, ROW = 0.0115, 0.0048
+WALE, ROW = 0.0062, 0.0048
 """Width of a column of stitches with the valley beside it, and height of a stitch, metres.
 
-Wool this thick is seen as knitted from as far away as a page shows a person.
+A page that shows a chest shows such columns; what is wool from farther away is told by its folds.
 """
-RAISED, RIBBED = 0.0013, 0.0013
+RAISED, RIBBED = 0.0005, 0.0013
 """Height of a column of stitches and of a rib at an edge, metres."""
 TWILL = 0.0021
 """Distance between two diagonal lines of denim, metres."""

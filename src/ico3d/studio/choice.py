@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ico3d.errors import SettingsError
+from ico3d.studio.dress.draping import draped
 from ico3d.studio.person.anny_person import load_anny
 from ico3d.studio.person.growing.grow import with_hair
 from ico3d.studio.person.npz_person import load_npz
@@ -32,4 +33,6 @@ def load_subject(subject: str, whole: bool = False, traits: Sequence[TraitName] 
         raise SettingsError("only the subject 'anny' can be a child.")
     else:
         person = load_npz(Path(subject), whole)
+    if whole:
+        person = draped(person)
     return with_traits(with_hair(person, "long-hair" in traits), traits)
