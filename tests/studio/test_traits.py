@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ico3d.errors import SettingsError
+from ico3d.studio import choice
 from ico3d.studio.choice import load_subject
-from ico3d.studio.person import choice
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture.lamps import STUDIOS
 from ico3d.studio.recording import Recording, record
