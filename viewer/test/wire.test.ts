@@ -2,7 +2,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
 import { floatFromHalf } from '../src/half.ts';
-import { MAX_TEXT_FRAME, type SpeechMessage } from '../src/protocol.ts';
+import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, type SpeechMessage } from '../src/protocol.ts';
 import { decode, encode } from '../src/talk/wire.ts';
 import { runPython } from '../support/python.ts';
 import { arrayBuffer } from '../support/references/head.ts';
@@ -85,7 +85,8 @@ function speechFrame(pcm: unknown, expressions: unknown, padding = 0): ArrayBuff
 
 test('a frame of speech must hold what its sizes say', () => {
   expect((decode(speechFrame([2], [1, 3])) as SpeechMessage).expressions).toMatchObject({ rows: 1, columns: 3 });
-  expect((decode(speechFrame([5], [70, 0])) as SpeechMessage).expressions).toMatchObject({ rows: 70, columns: 0 });
+  expect((decode(speechFrame([5], [70, 0])) as SpeechMessage).expressions).toMatchObject({ rows: 0, columns: 0 });
+  expect((decode(speechFrame([5], [65_536, 0])) as SpeechMessage).expressions).toMatchObject({ rows: 0, columns: 0 });
   const odd: [unknown, unknown, number?][] = [
     [[2], [200_000_000, 53]],
     [[5], [200_000_000, 0]],
@@ -106,5 +107,8 @@ test('a frame of speech must hold what its sizes say', () => {
 });
 
 test('a message that is longer than any may be is not even parsed', () => {
+  const wide = speechFrame([2], [1, 3], MAX_BINARY_FRAME - speechFrame([2], [1, 3]).byteLength + 1);
+  expect(() => decode(wide)).toThrow(/more than 65536 bytes/);
+  expect(() => decode(wide.slice(0, -1))).toThrow(/bytes instead of/);
   expect(() => decode(`{"type": "state", "state": "${'a'.repeat(MAX_TEXT_FRAME)}"}`)).toThrow(/more than 16384 bytes/);
 });

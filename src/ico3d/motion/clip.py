@@ -25,8 +25,8 @@ VERSION = 1
 """Version of the files."""
 MOST_CLIPS, LONGEST_NAME = 1000, 100
 """Gestures of a file, and letters of a name: each question of a visitor is compared with all."""
-MOST_BYTES = 16 << 20
-"""Bytes of a file; its curves become four times as much."""
+MOST_BYTES = 4 << 20
+"""Bytes of a file, 27 times those of the packaged person's: a page keeps each key as numbers."""
 _DAMAGE = (ValueError, KeyError, TypeError, AttributeError, OverflowError)
 """What parts of damaged files raise."""
 

@@ -20,9 +20,9 @@ BREATH = 4.1
 """Duration of a breath in seconds: 15 per minute, as of people at rest."""
 WEIGHT = 9.7
 """Period in seconds of the quickest of the sines that shift the weight."""
-SHIFT = 0.011
+SHIFT = 0.015
 """Displacement of the hips to each side, relative to `Person.height`."""
-DROP = 0.0035
+DROP = 0.0055
 """How far the hips sink when the weight is on one leg, relative to height."""
 SWAY = 0.003
 """Displacement of the hips forwards and back, relative to height."""
@@ -57,7 +57,7 @@ class Living:
         pose = np.broadcast_to(self.hung, (*times.shape, *self.hung.shape)).copy()
         breath = self.breath(times)
         weight = self._wander(times, WEIGHT, 1)
-        weight = 1.6 * weight / np.sqrt(1 + 1.6 * weight * weight)  # stays longer on one leg
+        weight = 3.2 * weight / np.sqrt(1 + 9 * weight * weight)  # stays longer on one leg
         self._turn_torso(times, breath, weight, pose)
         self._swing_arms(times, breath, pose)
         height = self.person.height
@@ -87,7 +87,7 @@ class Living:
 
     def _turn_torso(self, times: Array, breath: Array, weight: Array, pose: Array) -> None:
         zero = np.zeros_like(times)
-        roll = np.radians(2.0) * weight
+        roll = np.radians(3.4) * weight
         hips = np.stack([zero, zero, roll], -1) + self._vector(times, 12.7, 10, (0.5, 1.2, 0.2))
         spine = np.stack([zero, zero, -0.9 * roll], -1)
         chest = np.stack([_BREATHING[0] * breath, zero, -0.5 * roll], -1)

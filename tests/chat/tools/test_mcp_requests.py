@@ -69,3 +69,79 @@ async def test_only_a_ping_is_answered():
             while not any(getattr(one, "id", None) for one in server.answers):
                 await anyio.sleep(0.01)
     assert [one.id for one in server.answers if getattr(one, "id", None)] == [104]
+
+
+def answered(result):
+    from mcp.shared.message import SessionMessage
+    from mcp_types import JSONRPCResponse
+
+    return SessionMessage(JSONRPCResponse(jsonrpc="2.0", id=7, result=result))
+
+
+async def received(*messages):
+    """What comes through of messages."""
+    from ico3d.chat.tools.mcp_requests import asked_nothing
+
+    @contextlib.asynccontextmanager
+    async def transport():
+        there, reading = anyio.create_memory_object_stream(100)
+        for one in messages:
+            await there.send(one)
+        there.close()
+        yield reading, None
+
+    async with asked_nothing(transport()) as (reading, _):
+        return [item.message async for item in reading]
+
+
+async def test_of_an_answer_to_a_call_the_words_come_through():
+    content = [
+        {"type": "text", "text": "ten"},
+        {"type": "image", "data": "A" * 1000, "mimeType": "image/png"},
+        {"type": "text", "text": ["no words"]},
+        {"type": "x" * 100},
+        {},
+        7,
+    ]
+    rest = {"structuredContent": {"a": [{}] * 3900}, "_meta": {}, "isError": True}
+    (told,) = await received(answered({"content": content, **rest}))
+    words = "ten\n(image left out)\n(text left out)\n(%s left out)\n(left out)\n(left out)"
+    assert told.id == 7
+    assert told.result == {
+        "content": [{"type": "text", "text": words % ("x" * 40)}],
+        "isError": True,
+    }
+
+
+@pytest.mark.parametrize(
+    "asking",
+    [
+        {"resultType": "input_required"},
+        {"inputRequests": {"a": {"method": "roots/list"}}},
+        {"requestState": "x"},
+    ],
+)
+async def test_an_answer_that_asks_is_a_refused_one(asking):
+    """Within its result a server may ask for samples, of which the SDK makes 58,513 complaints."""
+    wrong = {"maxTokens": 1, "messages": [{"role": "user", "content": [{}] * 3900}]}
+    (told,) = await received(answered({"content": [{}] * 3900, "more": wrong, **asking}))
+    assert (told.id, told.error.message) == (7, "it asks this client for something")
+
+
+async def test_other_answers_come_through_as_they_are():
+    tools = {"tools": [{"name": "now", "inputSchema": {"type": "object"}}]}
+    (told,) = await received(answered(tools))
+    assert told.result == tools
+
+
+def test_what_breaks_the_protocol_is_said_in_a_few_words():
+    from mcp_types import ListToolsResult
+    from pydantic import ValidationError
+
+    from ico3d.chat.settings.mcp import McpServer
+    from ico3d.chat.tools.mcp import Connection
+
+    with pytest.raises(ValidationError) as caught:
+        ListToolsResult.model_validate({"tools": [{}] * 5000})
+    said = Connection(McpServer("clock", url="http://127.0.0.1:1/mcp")).told(caught.value)
+    assert said == "it does not keep to the protocol"

@@ -1,4 +1,5 @@
 import { PageError } from '../errors.ts';
+import { MOST } from '../shared.ts';
 import { say } from '../words/text.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, readHeadRows, type BakedHead, type HeadRows } from './baked-head.ts';
@@ -26,6 +27,7 @@ const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
 const HEAD_REST = 'head_rest.safetensors';
 const SHOULDERS = 'head_shoulders.safetensors';
 const ANIMATION = 'animation.json';
+const MANIFEST = 'manifest.json';
 
 /** The file of a body on a skeleton. */
 export const SKINNED = 'body/skinned.safetensors';
@@ -44,8 +46,28 @@ export type Locate = (name: string, sha256?: string) => string;
 
 /** Fetches and checks the manifest. */
 export async function loadManifest(locate: Locate, signal?: AbortSignal): Promise<Manifest> {
-  const response = await get(locate('manifest.json'), 'manifest.json', signal);
-  return checkManifest(await response.json().catch(() => null));
+  const response = await get(locate(MANIFEST), MANIFEST, signal);
+  return checkManifest(parseJson(new TextDecoder().decode(await readAll(response, MOST.manifest_bytes))));
+}
+
+/**
+ * What a response holds, which may be packed on the way: it is read no further than it may be long.
+ *
+ * @throws PageError if it is longer
+ */
+async function readAll(response: Response, most: number): Promise<Uint8Array<ArrayBuffer>> {
+  const reader = response.body!.getReader();
+  const parts: Uint8Array<ArrayBuffer>[] = [];
+  let length = 0;
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    length += part.value.length;
+    if (length > most) {
+      reader.cancel().catch(() => {});
+      throw new PageError(`${MANIFEST} is larger than ${most} bytes.`);
+    }
+    parts.push(part.value);
+  }
+  return new Uint8Array(await new Blob(parts).arrayBuffer());
 }
 
 /**
@@ -187,7 +209,10 @@ export class BundleFiles {
     const bytes = new Uint8Array(entry.size);
     let at = 0;
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
-      if (at + part.value.length > entry.size) throw new PageError(`${name} is longer than manifest.json says.`);
+      if (at + part.value.length > entry.size) {
+        reader.cancel().catch(() => {});
+        throw new PageError(`${name} is longer than manifest.json says.`);
+      }
       bytes.set(part.value, at);
       at += part.value.length;
       this.loaded += part.value.length;

@@ -11,6 +11,7 @@ import {
   MAX_SHAPES,
   MOST,
   OLDEST_BUNDLE,
+  SMALLER,
 } from '../shared.ts';
 
 /** Where the visitor starts, world space. */
@@ -141,9 +142,13 @@ export function checkManifest(value: unknown): Manifest {
 
 /** Room is made for files before they come, which may be packed on the way. */
 function checkFiles(files: Manifest['files']): void {
-  for (const [name, file] of Object.entries(files ?? bad('files'))) {
-    if (file?.size !== 0 && !isCount(file?.size, MOST.file_bytes)) bad(`files.${name}`);
+  const listed = Object.entries(files ?? bad('files'));
+  for (const [name, file] of listed) {
+    const most = (SMALLER as Record<string, number>)[name] ?? MOST.file_bytes;
+    if (file?.size !== 0 && !isCount(file?.size, most)) bad(`files.${name}`);
   }
+  const together = listed.reduce((sum, [, file]) => sum + file.size, 0);
+  if (listed.length > MOST.files || together > MOST.bundle_bytes) bad('files');
 }
 
 /** Texts go onto the page. */

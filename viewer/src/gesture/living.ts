@@ -8,8 +8,8 @@ import { about } from './turning.ts';
 const RADIANS = Math.PI / 180;
 const BREATH = 4.1; // duration of a breath, s
 const WEIGHT = 9.7; // period of the quickest of the sines that shift the weight, s
-const SHIFT = 0.011; // displacement of the hips to each side, relative to the person's height
-const DROP = 0.0035; // how far the hips sink with the weight on one leg, relative to height
+const SHIFT = 0.015; // displacement of the hips to each side, relative to the person's height
+const DROP = 0.0055; // how far the hips sink with the weight on one leg, relative to height
 const SWAY = 0.003; // displacement of the hips forwards and back, relative to height
 /** Angles by which a breath turns chest, head and collarbones. */
 const BREATHING = { chest: -1.1 * RADIANS, head: 0.9 * RADIANS, clavicles: 1.0 * RADIANS };
@@ -38,7 +38,7 @@ export class Living {
     const pose = [...this.figure.hung];
     const breath = this.breath(time);
     const shifted = this.wander(time, WEIGHT, 1);
-    const weight = (1.6 * shifted) / Math.sqrt(1 + 1.6 * shifted * shifted); // stays longer on one leg
+    const weight = (3.2 * shifted) / Math.sqrt(1 + 9 * shifted * shifted); // stays longer on one leg
     this.turnTorso(time, breath, weight, pose);
     this.swingArms(time, breath, pose);
     const root: Vector = [
@@ -67,7 +67,7 @@ export class Living {
   }
 
   private turnTorso(time: number, breath: number, weight: number, pose: Quat[]): void {
-    const roll = 2 * RADIANS * weight;
+    const roll = 3.4 * RADIANS * weight;
     const head = this.about([BREATHING.head * breath, 0, 0.4 * roll], time, 5.9, 16, [1.3, 2.2, 1.0]);
     const turns: [Role, Vector][] = [
       ['hips', this.about([0, 0, roll], time, 12.7, 10, [0.5, 1.2, 0.2])],

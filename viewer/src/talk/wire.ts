@@ -43,6 +43,7 @@ function joinFrame(header: Uint8Array, parts: Int16Array[]): ArrayBuffer {
 /** A frame as a message; throws an Error on one that is not from this protocol. */
 export function decode(frame: string | ArrayBuffer): ServerMessage {
   if (typeof frame === 'string') return known(parse(frame, MAX_TEXT_FRAME));
+  if (frame.byteLength > MAX_BINARY_FRAME) throw new Error(`a message of more than ${MAX_BINARY_FRAME} bytes`);
   const length = new DataView(frame).getUint32(0, true);
   const header = parse(new TextDecoder().decode(new Uint8Array(frame, 4, length)), MAX_BINARY_FRAME);
   let at = 4 + length;
@@ -73,7 +74,8 @@ function known(header: Header): ServerMessage {
   return header as unknown as ServerMessage;
 }
 
+/** Rows that hold nothing are none: nobody sent them, and each would take up memory. */
 function matrix(shape: number[], words: Uint16Array): Matrix {
   const [rows = 0, columns = 0] = shape;
-  return { rows, columns, values: Float32Array.from(words, floatFromHalf) };
+  return { rows: columns && rows, columns, values: Float32Array.from(words, floatFromHalf) };
 }

@@ -1,7 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
-import { identityOf } from '../../src/bundle/load.ts';
+import { identityOf, loadManifest } from '../../src/bundle/load.ts';
 import { blinkIndices, checkManifest } from '../../src/bundle/manifest.ts';
 import { parseSafetensors } from '../../src/bundle/safetensors.ts';
 import { readBakedHead } from '../../src/bundle/baked-head.ts';
@@ -86,10 +86,27 @@ describe('a damaged bundle is refused in one sentence', () => {
     ['poses without end', () => checkManifest({ ...manifest, head: { ...manifest.head, num_poses: 100_001 } }), /head\.num_poses/],
     ['a window without end', () => checkManifest({ ...manifest, head: null, body: lasting(1001) }), /body\.windows\[0\] /],
     ['a file without end', () => checkManifest({ ...manifest, files: { x: { sha256: '', size: 2 ** 28 + 1 } } }), /files\.x/],
+    ['gestures without end', () => checkManifest({ ...manifest, files: { 'body/gestures.safetensors': { sha256: '', size: 2 ** 22 + 1 } } }), /files\.body/],
+    ['an animation without end', () => checkManifest({ ...manifest, files: { 'animation.json': { sha256: '', size: 2 ** 20 + 1 } } }), /files\.animation/],
+    ['files without end', () => checkManifest({ ...manifest, files: manyFiles(3, 2 ** 28 - 1) }), /files /],
+    ['files without number', () => checkManifest({ ...manifest, files: manyFiles(257, 1) }), /files /],
     ['no files', () => checkManifest({ ...manifest, files: undefined }), /files/],
     ['no camera', () => checkManifest({ ...manifest, camera: null }), /camera/],
   ];
   test.each(cases)('%s', (_, act, sentence) => expect(act).toThrow(sentence));
+});
+
+/** So many files of so many bytes. */
+function manyFiles(count: number, size: number) {
+  return Object.fromEntries(Array.from({ length: count }, (_, i) => [`${i}`, { sha256: '', size }]));
+}
+
+test('a manifest is read no further than it may be long', async () => {
+  const located = (text: string) => () => `data:application/json,${encodeURIComponent(text)}`;
+  const spaced = JSON.stringify(manifest) + ' '.repeat(2 ** 20 - JSON.stringify(manifest).length);
+  await expect(loadManifest(located(spaced))).resolves.toMatchObject({ name: manifest.name });
+  await expect(loadManifest(located(`${spaced} `))).rejects.toThrow(/larger than 1048576 bytes/);
+  await expect(loadManifest(located('{'))).rejects.toThrow(/not that of an avatar bundle/);
 });
 
 /** A body with one window. */

@@ -7,12 +7,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ico3d.bundle import limits, manifest
+from ico3d.bundle import animation, backdrop, limits, manifest
+from ico3d.bundle.skinned.gestures import GESTURES
 from ico3d.chat.observing.timing import PARTS
 from ico3d.chat.wire.protocol_visits import MAX_NOTE, MAX_NOTES
 from ico3d.common.expression import EYE_NAMES, LEAKY_SLOPE, LIDS, MOST_DISPLACEMENTS, MOVE_HIDDEN
 from ico3d.common.spz import container
-from ico3d.motion import roles
+from ico3d.motion import clip, roles
 from ico3d.rig import shadow_map
 from ico3d.rig.rig import MOST_JOINTS
 from ico3d.speech import eyes
@@ -37,7 +38,7 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ),
     (
         "MOST",
-        "What else a bundle may have: a head's counts, a body's frames, bytes of a file.",
+        "What else a bundle may have: a head's counts, a body's frames, files and their bytes.",
         {
             "rank": limits.MAX_RANK,
             "displacements": MOST_DISPLACEMENTS,
@@ -46,7 +47,19 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             "num_poses": limits.MAX_POSES,
             "window_frames": limits.MAX_WINDOW_FRAMES,
             "posed_frames": limits.MAX_POSED_FRAMES,
+            "files": limits.MAX_FILES,
             "file_bytes": limits.MAX_FILE_BYTES,
+            "bundle_bytes": limits.MAX_BUNDLE_BYTES,
+            "manifest_bytes": limits.MAX_MANIFEST_BYTES,
+        },
+    ),
+    (
+        "SMALLER",
+        "Most bytes of files that may be less large than others, by name.",
+        {
+            animation.ANIMATION: animation.MAX_BYTES,
+            GESTURES: clip.MOST_BYTES,
+            **dict.fromkeys(backdrop.BACKGROUNDS, limits.MAX_BACKGROUND_BYTES),
         },
     ),
     ("MOVE_HIDDEN", "Width of the network of a head's displacements.", MOVE_HIDDEN),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from loguru import logger
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.services.llm_service import FunctionCallParams
+from pydantic import ValidationError
 
 from ico3d.chat.settings.headers import blanked, filled_in
 from ico3d.chat.settings.mcp import McpServer
@@ -138,6 +139,8 @@ class Connection:
             return f"it did not answer within {self.server.seconds:g} seconds"
         while isinstance(error, BaseExceptionGroup):  # of the tasks of a connection
             error = error.exceptions[0]
+        if isinstance(error, ValidationError):  # in full it may have millions of letters
+            return "it does not keep to the protocol"
         said = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         return blanked(said, self.server.secrets, self.server.where)[:LONGEST_COMPLAINT]
 
@@ -244,11 +247,8 @@ def unvalidated(client: "Client") -> "Client":
 
 
 def text_of(result: "CallToolResult") -> str:
-    """The words of an answer; what else it has, such as pictures, is named."""
-    parts = [
-        part.text if part.type == "text" else f"({part.type} left out)" for part in result.content
-    ]
-    return "\n".join(parts)
+    """The words of an answer, of which `mcp_requests` lets nothing else through."""
+    return "\n".join(part.text for part in result.content if part.type == "text")
 
 
 def is_lost(error: Exception) -> bool:

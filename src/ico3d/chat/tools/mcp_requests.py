@@ -1,15 +1,22 @@
-"""Leaves out what an MCP server asks of its client. Imported only where mcp is."""
+"""Leaves out what an MCP server asks of its client, and of answers all but their words.
+
+Imported only where mcp is.
+"""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from typing import Any
 
 import anyio
 from mcp.client import Transport
 from mcp.shared.message import SessionMessage
-from mcp_types import JSONRPCRequest
+from mcp_types import METHOD_NOT_FOUND, ErrorData, JSONRPCError, JSONRPCRequest, JSONRPCResponse
 
 PING = "ping"
+ASKING = ("inputRequests", "requestState")
+"""What an answer holds that asks for more instead, in versions of the protocol without sessions."""
+LONGEST_TYPE = 40
 
 
 @asynccontextmanager
@@ -18,14 +25,15 @@ async def asked_nothing(transport: Transport) -> AsyncIterator[tuple[Any, Any]]:
 
     This client offers servers nothing that they could ask for: neither samples nor roots nor
     questions to a user. The SDK would compare a request with all kinds of them before it says no,
-    and keep its complaints, tens of megabytes of 12 kB, until that is sent.
+    and keep its complaints, tens of megabytes of 12 kB, until that is sent. The same holds of an
+    answer that asks, and of what is not text in the answer to a call.
     """
     async with transport as (reading, writing):
         yield _Answers(reading), writing
 
 
 class _Answers:
-    """A stream of messages, without the requests among them."""
+    """A stream of messages without the requests among them, and of their answers the words."""
 
     def __init__(self, stream: Any):
         self._stream = stream
@@ -43,7 +51,7 @@ class _Answers:
         """
         while _asks(message := await self._stream.receive()):
             pass
-        return message
+        return _in_words(message)
 
     async def aclose(self) -> None:
         """Closes the stream."""
@@ -70,3 +78,30 @@ def _asks(message: SessionMessage | Exception) -> bool:
     if isinstance(message, Exception) or not isinstance(message.message, JSONRPCRequest):
         return False
     return message.message.method != PING
+
+
+def _in_words(message: SessionMessage | Exception) -> SessionMessage | Exception:
+    """The message; an answer to a call with its words alone, one that asks as an error."""
+    if isinstance(message, Exception) or not isinstance(message.message, JSONRPCResponse):
+        return message
+    answer = message.message
+    result = answer.result
+    if result.get("resultType") == "input_required" or any(key in result for key in ASKING):
+        refusal = ErrorData(code=METHOD_NOT_FOUND, message="it asks this client for something")
+        return replace(message, message=JSONRPCError(jsonrpc="2.0", id=answer.id, error=refusal))
+    content = result.get("content")
+    if not isinstance(content, list):
+        return message
+    text = "\n".join(_words(part) for part in content)
+    plain: dict[str, Any] = {"content": [{"type": "text", "text": text}]}
+    plain |= {key: result[key] for key in ("isError", "resultType") if key in result}
+    told = JSONRPCResponse(jsonrpc="2.0", id=answer.id, result=plain)
+    return replace(message, message=told)
+
+
+def _words(part: Any) -> str:
+    """The text of a part of an answer; what else it is, such as a picture, is named."""
+    kind = part.get("type") if isinstance(part, dict) else None
+    if kind == "text" and isinstance(part.get("text"), str):
+        return part["text"]
+    return f"({kind[:LONGEST_TYPE]} left out)" if isinstance(kind, str) else "(left out)"

@@ -1,3 +1,4 @@
+import { MAX_GAUSSIANS } from '../../shared.ts';
 import { colourOf, NUMBERS } from './rows.ts';
 
 const MOST_HEADER = 1 << 16; // bytes
@@ -19,7 +20,7 @@ export function readPly(bytes: ArrayBuffer): Float32Array | null {
   const isKnown = format?.[1] === 'binary_little_endian' && table?.[0] === 'element' && table[1] === 'vertex';
   if (!isKnown || named.includes(null) || columns.includes(-1)) return null;
   const [count, stride] = [Number(table[2]), 4 * properties.length];
-  if (bytes.byteLength !== header[0].length + count * stride) return null;
+  if (!(count <= MAX_GAUSSIANS) || bytes.byteLength !== header[0].length + count * stride) return null;
   const data = new DataView(bytes, header[0].length);
   const rows = new Float32Array(NUMBERS * count);
   for (let i = 0; i < count; i++) {
