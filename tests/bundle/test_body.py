@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ico3d.bundle.body import BakedWindow
+from ico3d.bundle.body import BakedWindow, _continued, _largest
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Manifest
 from ico3d.errors import BundleError
@@ -281,3 +281,10 @@ def test_a_missing_window_is_named(body_bytes, tmp_path, name):
     (folder / name).unlink()
     with pytest.raises(BundleError, match=name):
         Bundle.open(folder)
+
+
+@pytest.mark.parametrize("samples", [3, 4, 40])
+def test_the_largest_coefficients_are_those_of_all_samples_continued(samples):
+    rows = np.random.default_rng(samples).normal(size=(samples, 5, 7)).astype(np.float32)
+    expected = np.abs(_continued(rows.astype(np.float64))).max(axis=0)
+    np.testing.assert_allclose(_largest(rows), expected, rtol=1e-7)

@@ -10,7 +10,7 @@ from PIL import Image
 
 from ico3d.capture import decoding
 from ico3d.capture.multiview.clip import Clip
-from ico3d.capture.video import open_video, read_sound
+from ico3d.capture.video import LONGEST_PIECE, open_video, read_sound
 from ico3d.errors import CaptureError
 from support.recordings.films import write_film
 
@@ -123,3 +123,19 @@ def test_a_packet_of_thousands_of_sounds_does_not_fill_the_memory(tmp_path):
         container.mux(many)
     sound = read_sound(film)
     assert sound is not None and len(sound.samples) < 16_000
+
+
+@pytest.mark.parametrize("rate,pieces", [(48_000, 4608), (384_000, 32_768)])
+def test_pieces_of_sound_that_are_longer_than_any_coder_makes_are_left_out(tmp_path, rate, pieces):
+    """A packet of 128 KiB had 3,100 of 65,535 samples each, and took 6 GB."""
+    film = tmp_path / "a.mka"
+    with av.open(str(film), "w") as container:
+        stream = container.add_stream("flac", rate=rate, layout="mono")
+        stream.codec_context.format = "s16"
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 4 * pieces), np.int16), "s16", "mono")
+        frame.rate, frame.pts = rate, 0
+        for packet in [*stream.encode(frame), *stream.encode()]:
+            container.mux(packet)
+    assert stream.codec_context.frame_size == pieces
+    sound = read_sound(film)
+    assert (sound is not None) == (pieces <= LONGEST_PIECE)

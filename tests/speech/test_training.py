@@ -1,11 +1,12 @@
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 import torch
 
 from ico3d.cli import main
-from ico3d.errors import SettingsError
+from ico3d.errors import ModelError, SettingsError
 from ico3d.speech.encoder import load_builtin
 from ico3d.speech.training import train_encoder as training
 from ico3d.speech.training.settings import EncoderSettings
@@ -38,6 +39,13 @@ def test_other_settings_need_another_folder(tmp_path):
     list(EncoderTraining(SETTINGS, tmp_path / "checkpoint.pt").run())
     with pytest.raises(SettingsError, match="other settings"):
         EncoderTraining(EncoderSettings(steps=5), tmp_path / "checkpoint.pt")
+
+
+def test_a_checkpoint_of_something_else_is_one_sentence(tmp_path):
+    for held in ([], {"settings": asdict(SETTINGS), "network": 5}):
+        torch.save(held, tmp_path / "checkpoint.pt")
+        with pytest.raises(ModelError, match="holds no training of an encoder"):
+            EncoderTraining(SETTINGS, tmp_path / "checkpoint.pt")
 
 
 def test_the_finished_encoder_is_the_trained_one_with_unit_features(tmp_path):

@@ -155,8 +155,7 @@ def _check_values(window: BakedWindow, name: str) -> None:
     if window.clusters.max() >= window.num_clusters:
         raise BundleError(f"{name}: 'clusters' names one that is not there.")
     p, r, _ = window.ranks
-    rows = _continued(window.coefficients.astype(np.float64))
-    most = 1.25 * np.abs(rows).max(axis=0)  # Catmull–Rom overshoots by a quarter at most
+    most = 1.25 * _largest(window.coefficients)  # Catmull–Rom overshoots by a quarter at most
     most = most[window.clusters]  # (N, P + R + L)
     places = np.abs(window.means).max(axis=1) + _reach(most[:, :p], window.position_basis)
     if places.max() > _MAX_LENGTH:
@@ -166,6 +165,17 @@ def _check_values(window: BakedWindow, name: str) -> None:
     sizes = np.abs(window.scales).max(axis=1) + _reach(most[:, p + r :], window.scale_basis)
     if sizes.max() > _MAX_LENGTH:
         raise BundleError(f"{name}: its Gaussians grow beyond {_MAX_LENGTH:g} m.")
+
+
+def _largest(coefficients: np.ndarray) -> np.ndarray:
+    """(C, K) float64 the largest sizes of coefficients (S, C, K), continued at both ends.
+
+    They may be hundreds of megabytes, so no copy is made of all of them.
+    """
+    before = _continued(coefficients[:3].astype(np.float64))[0]
+    after = _continued(coefficients[-3:].astype(np.float64))[-1]
+    sizes = np.maximum(coefficients.max(axis=0), -coefficients.min(axis=0))  # (C, K)
+    return np.maximum(np.maximum(np.abs(before), np.abs(after)), sizes)
 
 
 def _reach(most: np.ndarray, basis: np.ndarray) -> np.ndarray:

@@ -25,8 +25,11 @@ FORMATS = (
     "yuv4mpegpipe"
 )
 """Other kinds of files that are opened, by FFmpeg's names: none that leads to other files."""
-LARGEST_PACKET = 1 << 17
-"""Bytes of compressed sound that are decoded at once: what is silent takes 3,000 times as many."""
+LARGEST_PACKET, LONGEST_PIECE = 1 << 15, 1 << 14
+"""Bytes of compressed sound that are decoded at once, and samples of one piece of it.
+
+A packet may have hundreds of pieces, of 42 bytes each where they are silent.
+"""
 
 
 @dataclass
@@ -159,6 +162,9 @@ def opened(path: Path) -> Any:
                 stream.codec_context.options = pixels
                 set_threads(stream.codec_context)
                 check_held(str(path), stream.codec_context)
+        for stream in container.streams.audio:
+            if stream.codec_context is not None and is_compressed(stream):
+                stream.codec_context.options = {"max_samples": str(LONGEST_PIECE)}
     except CaptureError:
         container.close()
         raise
@@ -288,5 +294,9 @@ def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
 
 def _is_large(stream: Any, packet: Any) -> bool:
     """Whether a packet may hold many pieces of compressed sound, which are decoded at once."""
-    compressed = stream.type == "audio" and not stream.codec_context.name.startswith("pcm_")
-    return compressed and packet.size > LARGEST_PACKET
+    return is_compressed(stream) and packet.size > LARGEST_PACKET
+
+
+def is_compressed(stream: Any) -> bool:
+    """Whether a stream of PyAV is of sound that takes more memory than in its file."""
+    return stream.type == "audio" and not stream.codec_context.name.startswith("pcm_")

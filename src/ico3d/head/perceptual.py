@@ -6,6 +6,7 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
 
+from ico3d.common.unpacking.heads import check_head
 from ico3d.common.weights import model_file
 from ico3d.errors import ModelError
 
@@ -35,10 +36,11 @@ class PerceptualLoss(nn.Module):
         super().__init__()
         path = model_file(WEIGHTS, "the perceptual loss")
         self.features = vgg_layers(CHANNELS)
-        tensors = load_file(path)
         try:
+            check_head(path)
+            tensors = load_file(path)
             self.load_state_dict({name: tensors[name] for name in self.state_dict()})
-        except (KeyError, RuntimeError) as error:
+        except (KeyError, RuntimeError, ValueError) as error:
             raise ModelError(f"{path} does not hold VGG-16 weights: {error}.") from error
         self.requires_grad_(False)
 

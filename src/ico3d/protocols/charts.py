@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.common.files import read_small
 from ico3d.measure.methods.plots import new_figure, save_figure
 from ico3d.training.log import METRICS
 
@@ -54,7 +55,7 @@ def draw_training(path: Path, runs: Mapping[str, tuple[Path, float]]) -> None:
     figure = Figure(figsize=(10, 4), dpi=120, layout="constrained")
     over_time, over_count = figure.subplots(1, 2, sharey=True)
     for name, (folder, seconds) in runs.items():
-        lines = (folder / METRICS).read_text().splitlines()
+        lines = read_small(folder / METRICS).splitlines()
         steps, psnr, count = np.array(
             [
                 [entry[key] for key in ("step", "psnr", "gaussians")]

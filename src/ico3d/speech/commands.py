@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 import tyro
 
+from ico3d.common.files import read_small
 from ico3d.speech.training.settings import EncoderSettings
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class TrainSpeech:
     def _metrics(self, step: int) -> TextIO:
         """metrics.jsonl, without what an interrupted run wrote after its last checkpoint."""
         path = self.out / "metrics.jsonl"
-        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+        lines = read_small(path).decode().splitlines(keepends=True) if path.exists() else []
         file = path.open("w")
         file.writelines(lines[:step])
         return file

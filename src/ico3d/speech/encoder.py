@@ -13,6 +13,7 @@ from torch import nn
 
 from ico3d.common.catalogue.table import TABLE
 from ico3d.common.downloads.fetching import sha256
+from ico3d.common.unpacking.heads import MOST_HEAD, bounded_head
 from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.weights import model_file, model_of
 from ico3d.errors import ModelError, SettingsError
@@ -111,6 +112,10 @@ def load_builtin(path: Path) -> FrozenEncoder:
     from safetensors.torch import load
 
     data = _read(path)
+    try:
+        bounded_head(data, MOST_HEAD)
+    except ValueError as error:
+        raise ModelError(f"{path} holds no encoder: {error}.") from error
     state = {key: value.float() for key, value in load(data).items() if "readout" not in key}
     encoder = _frozen("builtin", BuiltinEncoder(), state, data, path)
     read = [load(data).get(f"readout.articulation.{name}") for name in ("weight", "bias")]

@@ -1,11 +1,12 @@
 """Weights that someone has packed are not unpacked: torch would do so without a bound."""
 
+import pickle
 import zipfile
 
 import pytest
 import torch
 
-from ico3d.common.unpacking.weights import check_unpacked, load_weights
+from ico3d.common.unpacking.weights import MOST_STEPS, check_unpacked, load_weights
 from ico3d.errors import ModelError
 from ico3d.measure.sync.network import load_state
 from ico3d.speech.encoder import load_ave
@@ -75,3 +76,19 @@ def test_a_damaged_archive_is_one_sentence(tmp_path):
     (tmp_path / "a.pth").write_bytes(b"PK\3\4" + bytes(50))
     with pytest.raises(ModelError, match="damaged file of weights"):
         load_weights(tmp_path / "a.pth")
+
+
+@pytest.mark.parametrize("old", [False, True])
+@pytest.mark.parametrize("made", [b"}", b"\x8f"])
+def test_a_file_of_nothing_but_objects_is_not_read(tmp_path, old, made):
+    """A megabyte of empty sets becomes 235 of memory."""
+    file, many = tmp_path / "a.pth", b"\x80\x04](" + made * (MOST_STEPS + 1) + b"e."
+    if old:
+        file.write_bytes(
+            b"".join(pickle.dumps(part, 2) for part in (0x1950A86A20F9469CFC6C, 1001, {})) + many
+        )
+    else:
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("archive/data.pkl", many)
+    with pytest.raises(ModelError, match="more objects than a file of weights"):
+        load_weights(file)

@@ -1,5 +1,6 @@
 """Files of all kinds that are given instead of a good video."""
 
+import io
 from contextlib import contextmanager
 
 import numpy as np
@@ -9,7 +10,7 @@ from PIL import Image
 from ico3d.avatar.film.video import write_video
 from ico3d.capture.capture import Sound
 from ico3d.creating.looking import samples
-from ico3d.creating.looking.examine import examine
+from ico3d.creating.looking.examine import examine, refuse_photograph
 from ico3d.errors import CaptureError
 from support.needs import needs
 
@@ -55,6 +56,24 @@ def test_a_photograph_is_refused_and_told_why(tmp_path):
         examine(tmp_path / "me.jpg", 512, lambda _: None)
     with pytest.raises(CaptureError, match="is a photograph"):
         examine(_video(tmp_path / "one.mp4", 1), 512, lambda _: None)
+
+
+@pytest.mark.parametrize("kind", ["PNG", "GIF", "BMP", "TIFF", "WEBP", "MPO", "JPEG"])
+def test_every_kind_of_photograph_is_told_by_how_it_begins(tmp_path, kind):
+    """To open a TIFF of 67 MB took 3.5 GB: what is beside its pixels is read at once."""
+    made = io.BytesIO()
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(made, kind)
+    (tmp_path / "me").write_bytes(made.getvalue()[:16])
+    with pytest.raises(CaptureError, match="is a photograph"):
+        refuse_photograph(tmp_path / "me")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"RIFF\0\0\0\0AVI LIST", b"\0\0\0\x20ftypisom", b"BM is no picture"]
+)
+def test_other_files_are_none(tmp_path, content):
+    (tmp_path / "a").write_bytes(content)
+    refuse_photograph(tmp_path / "a")
 
 
 def test_what_is_no_video_is_one_sentence(tmp_path):

@@ -36,6 +36,9 @@ export interface CaptionEvents {
   over(utterance: number, interrupted: boolean): void;
 }
 
+/** Sentences that wait to be spoken; of more, the first are forgotten. */
+const MOST_SENTENCES = 1000;
+
 /** Follows the words of the answers by the clock of the sound. */
 export class Captioning {
   private readonly position: () => { utterance: number; seconds: number } | null;
@@ -57,7 +60,7 @@ export class Captioning {
     const key = nameOf(utterance, first_sample);
     const times = this.times.get(key);
     this.times.delete(key);
-    this.sentences = this.sentences.filter((one) => one.utterance !== utterance || one.first !== first_sample);
+    this.sentences = this.sentences.filter((one) => one.utterance !== utterance || one.first !== first_sample).slice(1 - MOST_SENTENCES);
     const words = times ? timed(text, times) : estimated(text, first_sample / SPEECH_RATE);
     this.sentences.push({ utterance, first: first_sample, text, words });
     this.timer ??= setInterval(() => this.look(), PERIOD);

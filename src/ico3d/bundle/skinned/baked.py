@@ -1,5 +1,6 @@
 """The file of a body on a skeleton (docs/bundle.md, body/skinned.safetensors)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -37,6 +38,7 @@ _AXES: Axes = {
 }
 _UNEVEN = 1e-2
 """Largest difference of a quaternion's length from 1."""
+_AT_ONCE = 1 << 16
 _MAX_LENGTH = 1e4
 """Largest length in metres; longer ones are no person, and overflow when a shader squares them."""
 _MAX_LOG_SCALE = 10.0
@@ -190,6 +192,19 @@ def _spec(info: SkinnedInfo) -> Spec:
     }
 
 
+def _blocks(quats: np.ndarray) -> Iterator[np.ndarray]:
+    """Stored rotations (..., 4), some at a time: as numbers they are four times as large."""
+    rows = quats.reshape(-1, 4)
+    for first in range(0, len(rows), _AT_ONCE):
+        yield rows[first : first + _AT_ONCE]
+
+
+def _unevenness(quats: np.ndarray) -> float:
+    """By how much the length of one of the stored rotations (N, 4) differs from 1 at most."""
+    lengths = np.linalg.norm(quats / np.float64(QUAT_UNIT), axis=1)
+    return float(np.abs(lengths - 1).max())
+
+
 def _check_values(baked: BakedSkinned) -> None:
     """Checks all values, so that Gaussians stay within bounds in any pose.
 
@@ -203,8 +218,7 @@ def _check_values(baked: BakedSkinned) -> None:
     _require(_ascends(baked.moving, info.num_joints), "'moving' must name joints in order")
     _require(_ascends(baked.known, info.num_frames), "'known' must name frames in order")
     for name in ("quats", "held", "rotations"):
-        values = getattr(baked, name) / np.float64(QUAT_UNIT)
-        off = np.abs(np.linalg.norm(values, axis=-1) - 1).max()
+        off = max(map(_unevenness, _blocks(getattr(baked, name))))
         _require(off <= _UNEVEN, f"'{name}' holds one that is no rotation")
     bounds = {
         "means": _MAX_LENGTH,

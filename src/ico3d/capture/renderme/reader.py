@@ -109,9 +109,11 @@ class RenderMe360(SmcCapture):
         samples = file.numbers(f"{SOUND}/audio", None)
         if samples is None:
             return None
-        if samples.ndim > 2 or np.abs(samples).max(initial=0.0) > LOUDEST:
+        loudest = max(samples.max(initial=0.0), -samples.min(initial=0.0))
+        if samples.ndim > 2 or loudest > LOUDEST:
             raise CaptureError(f"{file.path}: {SOUND}/audio is no sound between -1 and 1.")
-        return mono(np.clip(samples, -1, 1).astype(np.float32), rate)
+        np.clip(samples, -1, 1, out=samples)
+        return mono(samples.astype(np.float32), rate)
 
     def flame(self, frame: int) -> FlameFit | None:
         """FLAME parameters and vertices of a frame, or None."""

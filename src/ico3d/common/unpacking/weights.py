@@ -1,35 +1,64 @@
 """Reads PyTorch's files of weights (.pth, .pt, .bin), in which torch unpacks what is packed."""
 
+import pickletools
 import zipfile
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ico3d.common.unpacking.zips import check_directory
 from ico3d.errors import ModelError
 
+MOST_STEPS = 500_000
+"""Steps of a pickle: each may make an object of 200 bytes. Models of thousands of tensors have some
+ten thousand."""
+OLD_PICKLES = 5
+"""Pickles at the beginning of a file of PyTorch before 1.6: a mark, a version, what wrote it, the
+objects, and the keys of the numbers behind."""
 ZIP = b"PK\3\4"
 """How a file begins that torch takes for an archive; it has no packed parts in other ones."""
 
 
 def check_unpacked(path: Path) -> None:
-    """Refuses a file of weights that is larger unpacked: torch itself packs none.
+    """Refuses a file of weights that becomes much larger: torch itself packs none.
 
     Raises:
-        ModelError: If it is, or is a damaged archive.
+        ModelError: If it is packed, has more objects than models have, or is damaged.
         OSError: If it cannot be read.
     """
     with path.open("rb") as file:
-        if file.read(len(ZIP)) != ZIP:
-            return
         try:
-            check_directory(file)
-            with zipfile.ZipFile(file) as archive:
-                entries = archive.infolist()
+            if file.read(len(ZIP)) == ZIP:
+                _check_archive(path, file)
+            else:
+                file.seek(0)
+                _check_steps(path, file, OLD_PICKLES)
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
             raise ModelError(f"{path} is a damaged file of weights: {error}") from error
-    packed = any(entry.compress_type != zipfile.ZIP_STORED for entry in entries)
-    if packed or sum(entry.file_size for entry in entries) > path.stat().st_size:
-        raise ModelError(f"{path} is packed, as no file is that PyTorch writes: it is not read.")
+
+
+def _check_archive(path: Path, file: BinaryIO) -> None:
+    check_directory(file)
+    with zipfile.ZipFile(file) as archive:
+        entries = archive.infolist()
+        packed = any(entry.compress_type != zipfile.ZIP_STORED for entry in entries)
+        if packed or sum(entry.file_size for entry in entries) > path.stat().st_size:
+            raise ModelError(
+                f"{path} is packed, as no file is that PyTorch writes: it is not read."
+            )
+        for entry in entries:
+            if entry.filename.endswith(".pkl"):
+                with archive.open(entry) as pickled:
+                    _check_steps(path, pickled, 1)
+
+
+def _check_steps(path: Path, file: Any, pickles: int) -> None:
+    """Reads some pickles one after the other, without making anything of them."""
+    left = MOST_STEPS
+    for _ in range(pickles):
+        left -= sum(1 for _ in islice(pickletools.genops(file), left + 1))
+        if left < 0:
+            raise ModelError(f"{path} holds more objects than a file of weights: it is not read.")
 
 
 def load_weights(path: Path, device: Any = "cpu") -> Any:

@@ -13,6 +13,7 @@ from torch import nn
 from torch.nn import functional
 
 from ico3d.common.files import write_atomic
+from ico3d.common.unpacking.heads import check_head
 from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.visemes import VISEMES
 from ico3d.errors import ModelError, SettingsError
@@ -115,15 +116,18 @@ class EncoderTraining:
     def _resume(self) -> None:
         """Takes over the checkpoint."""
         state = load_weights(self._checkpoint, None)
-        if state["settings"] != asdict(self.settings):
-            raise SettingsError(
-                f"{self._checkpoint.parent} holds a training with other settings: "
-                "use the same ones, or another folder."
-            )
-        self.network.load_state_dict(state["network"])
-        self.readout.load_state_dict(state["readout"])
-        self._optimiser.load_state_dict(state["optimiser"])
-        self.step = state["step"]
+        try:
+            if state["settings"] != asdict(self.settings):
+                raise SettingsError(
+                    f"{self._checkpoint.parent} holds a training with other settings: "
+                    "use the same ones, or another folder."
+                )
+            self.network.load_state_dict(state["network"])
+            self.readout.load_state_dict(state["readout"])
+            self._optimiser.load_state_dict(state["optimiser"])
+            self.step = int(state["step"])
+        except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
+            raise ModelError(f"{self._checkpoint} holds no training of an encoder.") from error
 
     def finished(self) -> tuple[BuiltinEncoder, Readout]:
         """Encoder and readout for use after training.
@@ -243,12 +247,13 @@ def load_readout(path: Path) -> Readout:
     """
     from safetensors.torch import load_file
 
-    state = load_file(path)
     readout = Readout()
     try:
+        check_head(path)
+        state = load_file(path)
         readout.load_state_dict(
             {k.removeprefix(_READOUT): v.float() for k, v in state.items() if _READOUT in k}
         )
-    except RuntimeError:
+    except (RuntimeError, ValueError):
         raise ModelError(f"{path} holds no readout: train it with ico3d train speech.") from None
     return readout.requires_grad_(False)

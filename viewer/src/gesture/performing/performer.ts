@@ -30,6 +30,9 @@ interface Part {
   weight: number; // over the pose beneath it, 0 to 1
 }
 
+/** Gestures that are kept in mind: each is worked out in every picture, and an hour of speech has fewer. */
+const MOST_TAKEN = 1000;
+
 /** A person who follows directions: the living rest, turned to the visitor, with gestures blended in. */
 export class Performer {
   private readonly living: Living;
@@ -51,7 +54,7 @@ export class Performer {
     for (const direction of directions) {
       if (isCue(direction)) {
         const clip = this.clips.get(direction.name)?.[direction.mirror ? 1 : 0];
-        if (clip) this.taken.push({ cue: direction, clip, clock, release: null });
+        if (clip && this.taken.length < MOST_TAKEN) this.taken.push({ cue: direction, clip, clock, release: null });
       } else {
         const held = this.taken.find((one) => one.clock === clock && one.cue.number === direction.number);
         if (held) held.release = direction.time;
