@@ -63,7 +63,7 @@ def test_a_missing_or_wrong_file_is_one_sentence(tmp_path, monkeypatch):
     with pytest.warns(UserWarning), pytest.raises(ModelError, match="does not hold"):
         load_ave(tmp_path / "other.pth")
     (tmp_path / "text.pth").write_text("hello")
-    with pytest.warns(UserWarning), pytest.raises(ModelError, match="cannot be read as weights"):
+    with pytest.warns(UserWarning), pytest.raises(ModelError, match="damaged file of weights"):
         load_ave(tmp_path / "text.pth")
     with pytest.raises(ModelError, match="cannot be read"):
         load_builtin(tmp_path / "nothing.safetensors")

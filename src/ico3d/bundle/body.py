@@ -156,13 +156,13 @@ def _check_values(window: BakedWindow, name: str) -> None:
         raise BundleError(f"{name}: 'clusters' names one that is not there.")
     p, r, _ = window.ranks
     most = 1.25 * _largest(window.coefficients)  # Catmull–Rom overshoots by a quarter at most
-    most = most[window.clusters]  # (N, P + R + L)
-    places = np.abs(window.means).max(axis=1) + _reach(most[:, :p], window.position_basis)
+    of, most = window.clusters, most.T  # (P + R + L, C)
+    places = np.abs(window.means).max(axis=1) + _reach(most[:p], of, window.position_basis)
     if places.max() > _MAX_LENGTH:
         raise BundleError(f"{name}: it reaches farther than {_MAX_LENGTH:g} m.")
-    if _reach(most[:, p : p + r], window.rotation_basis).max() > _MAX_LENGTH:
+    if _reach(most[p : p + r], of, window.rotation_basis).max() > _MAX_LENGTH:
         raise BundleError(f"{name}: its rotations are out of range.")
-    sizes = np.abs(window.scales).max(axis=1) + _reach(most[:, p + r :], window.scale_basis)
+    sizes = np.abs(window.scales).max(axis=1) + _reach(most[p + r :], of, window.scale_basis)
     if sizes.max() > _MAX_LENGTH:
         raise BundleError(f"{name}: its Gaussians grow beyond {_MAX_LENGTH:g} m.")
 
@@ -178,9 +178,12 @@ def _largest(coefficients: np.ndarray) -> np.ndarray:
     return np.maximum(np.maximum(np.abs(before), np.abs(after)), sizes)
 
 
-def _reach(most: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """Σ_k most_nk · |basis_kn|, the largest of D, of (N, K) and (K, N, D): (N,)."""
-    reach = np.zeros(len(most))
-    for values, part in zip(most.T, basis, strict=True):
-        reach += values * np.abs(part.astype(np.float64)).max(axis=1)
+def _reach(most: np.ndarray, clusters: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Σ_k most_kc · |basis_kn|, the largest of D, for n of cluster c: (N,) of (K, C), (K, N, D)."""
+    reach = np.zeros(len(clusters))
+    for values, part in zip(most, basis, strict=True):
+        sizes = np.maximum(
+            part.max(axis=1).astype(np.float64), -part.min(axis=1).astype(np.float64)
+        )
+        reach += values[clusters] * sizes
     return reach

@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import nn
 
+from ico3d.common.unpacking.heads import check_head
 from ico3d.common.unpacking.weights import check_unpacked
 from ico3d.errors import MissingExtraError, ModelError
 from ico3d.speech.blocks import PAST, ROWS, SIZE
@@ -50,8 +51,12 @@ def load_network(folder: Path) -> Hubert:
         from transformers import HubertModel
     except ImportError:
         raise MissingExtraError("transformers", "hubert", "the speech encoder 'hubert'") from None
-    check_unpacked(weight_file(folder))
+    weights = weight_file(folder)
     try:
+        if weights.suffix == ".safetensors":
+            check_head(weights)
+        else:
+            check_unpacked(weights)
         loaded: Any = HubertModel.from_pretrained(
             folder, local_files_only=True, output_loading_info=True, weights_only=True
         )

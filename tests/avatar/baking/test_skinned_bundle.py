@@ -89,6 +89,15 @@ def test_the_most_important_come_first_and_the_invisible_not_at_all(person):
     assert result.loss.psnr_baked_vs_exact is not None and result.loss.psnr_baked_vs_exact > 50
 
 
+def test_more_of_what_pages_show_comes_first(person, monkeypatch):
+    shares = []
+    for upper in (1.0, skinned_bundle.UPPER):
+        monkeypatch.setattr(skinned_bundle, "UPPER", upper)
+        heights = skinned_bundle.bake(person, None).baked.means[:, 1]
+        shares.append((heights[:196] > 0.55 * heights.max()).mean())
+    assert shares[1] > shares[0] + 0.05
+
+
 def test_importance_is_what_a_picture_lacks_without_a_gaussian():
     """Estimated by random signs, against leaving out a little of each."""
     gaussians = skinned_gaussians(baked := capsule_person(30), recorded_pose(baked, 0))

@@ -5,6 +5,7 @@ import zipfile
 
 import pytest
 import torch
+from safetensors.torch import save_file
 
 from ico3d.common.unpacking.weights import MOST_STEPS, check_unpacked, load_weights
 from ico3d.errors import ModelError
@@ -46,6 +47,18 @@ def test_hubert_is_not_unpacked(tmp_path):
     (tmp_path / "config.json").write_text('{"model_type": "hubert"}')
     packed(tmp_path / "pytorch_model.bin")
     with pytest.raises(ModelError, match="is packed"):
+        load_network(tmp_path)
+
+
+@needs("transformers")
+def test_hubert_as_safetensors_is_no_pickle(tmp_path):
+    (tmp_path / "config.json").write_text('{"model_type": "hubert"}')
+    save_file({"x": torch.zeros(1)}, tmp_path / "model.safetensors")
+    with pytest.raises(ModelError, match="does not hold HuBERT: it lacks"):
+        load_network(tmp_path)
+    many = {f"{i}": torch.zeros(0) for i in range(10_001)}
+    save_file(many, tmp_path / "model.safetensors")
+    with pytest.raises(ModelError, match="its head is larger than those of models"):
         load_network(tmp_path)
 
 
@@ -92,3 +105,50 @@ def test_a_file_of_nothing_but_objects_is_not_read(tmp_path, old, made):
             archive.writestr("archive/data.pkl", many)
     with pytest.raises(ModelError, match="more objects than a file of weights"):
         load_weights(file)
+
+
+def archive_of(path, pickled, name="archive/data.pkl"):
+    """A file of weights whose objects are these."""
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(name, pickled)
+    return path
+
+
+@pytest.mark.parametrize("module", ["builtins", "__builtin__"])
+@pytest.mark.parametrize("how", ["by name", "by words"])
+def test_nothing_is_made_of_a_number_alone(tmp_path, module, how):
+    """389 bytes became as many gigabytes as they said: `bytearray` is a name that torch permits."""
+    if how == "by name":
+        named = f"c{module}\nbytearray\n".encode()
+    else:
+        named = b"\x8c" + bytes([len(module)]) + module.encode() + b"\x8c\tbytearray\x93"
+    file = archive_of(tmp_path / "a.pt", b"\x80\x04" + named + b"J\0\0\0\x10\x85R.")
+    with pytest.raises(ModelError, match="as no file of weights does"):
+        load_weights(file)
+
+
+def test_objects_are_counted_whatever_the_case_of_their_name(tmp_path):
+    many = b"\x80\x04](" + b"}" * (MOST_STEPS + 1) + b"e."
+    file = archive_of(tmp_path / "a.pt", many, "archive/DATA.PKL")
+    with pytest.raises(ModelError, match="more objects"):
+        load_weights(file)
+    with zipfile.ZipFile(file, "a") as archive:
+        archive.writestr("archive/data.pkl", b"\x80\x02}.")
+    with pytest.raises(ModelError, match="two parts of one name"):
+        load_weights(file)
+
+
+def test_an_archive_whose_directory_is_elsewhere_is_refused(tmp_path):
+    """Of two directories torch read the one that was not looked at."""
+    torch.save({"x": torch.zeros(3)}, tmp_path / "a.pth")
+    (tmp_path / "b.pth").write_bytes(b"PK\3\4" + (tmp_path / "a.pth").read_bytes())
+    with pytest.raises(ModelError, match="its directory is not where it should be"):
+        load_weights(tmp_path / "b.pth")
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16, torch.int64, torch.bool])
+def test_every_kind_of_number_is_read(tmp_path, dtype):
+    layer = torch.nn.Linear(2, 2)
+    held = {"x": torch.ones(3).to(dtype), "layer": layer.state_dict(), "own": layer.weight}
+    torch.save(held, tmp_path / "a.pth")
+    assert load_weights(tmp_path / "a.pth")["x"].dtype == dtype

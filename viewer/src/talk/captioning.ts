@@ -70,7 +70,7 @@ export class Captioning {
   spoken(message: SpokenMessage): void {
     const sentence = this.sentences.find((one) => one.utterance === message.utterance && one.first === message.first_sample);
     if (sentence) sentence.words = timed(sentence.text, message);
-    else this.times.set(nameOf(message.utterance, message.first_sample), message);
+    else if (this.times.size < MOST_SENTENCES) this.times.set(nameOf(message.utterance, message.first_sample), message);
   }
 
   /** An utterance was heard to its end. */

@@ -10,6 +10,7 @@ import {
   type WelcomeMessage,
 } from '../protocol.ts';
 import { say, type Sentence } from '../words/text.ts';
+import { Allowance } from './line/allowance.ts';
 import { Silence } from './line/silence.ts';
 import { SoundQueue } from './line/sound-queue.ts';
 import { told } from './told.ts';
@@ -21,6 +22,9 @@ const FIRST_VISIT = 5000; // ms until a server whose queue is full is asked agai
 const LONGEST_VISIT = 60_000;
 const FULL = 1013; // close code: the queue is full, too
 const SILENT = 4000; // close code: another line speaks
+/** Bytes of text, and of sound with its faces, that a server may send at once, and for long per second: an answer has 15 MB. */
+const TEXT = [1 << 20, 1 << 15] as const;
+const SOUND = [1 << 25, 1 << 18] as const;
 const LONGEST_HANDSHAKE = 8000; // ms, of a line that is to go on with a session
 
 /** The session is over. */
@@ -72,6 +76,8 @@ export class Connection {
   private fatal: Pick<Ending, 'sentence' | 'again'> | null = null; // the server's last word
   private over = false; // the session is, and no other one has begun
   private readonly sound: SoundQueue;
+  private readonly text = new Allowance(...TEXT);
+  private readonly bytes = new Allowance(...SOUND);
   private readonly silence = new Silence(() => this.fellSilent());
   private readonly url: () => string;
   private readonly events: ConnectionEvents;
@@ -186,6 +192,8 @@ export class Connection {
   private receive(frame: string | ArrayBuffer): void {
     if (this.welcomed) this.silence.heard();
     if (this.speaks()) this.goOn();
+    // What is beyond is not heard: it may be packed a thousandfold, and is kept until it is spoken.
+    if (!(typeof frame === 'string' ? this.text.take(frame.length) : this.bytes.take(frame.byteLength))) return;
     const message = decode(frame);
     if (message.type === 'welcome') this.welcome(message);
     else if (message.type === 'place') this.queue(message);

@@ -16,11 +16,11 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-function connect() {
+function connect(message: ConnectionEvents['message'] = () => {}) {
   const endings: Ending[] = [];
   const told: string[] = [];
   const events: ConnectionEvents = {
-    message: () => {},
+    message,
     welcome: ({ resumed }, replaced) => told.push(`welcome, resumed ${resumed}, replaced ${replaced}`),
     lost: () => told.push('lost'),
     regained: () => told.push('regained'),
@@ -286,4 +286,17 @@ describe('a network that has gone without a word', () => {
     vi.advanceTimersByTime(30_000);
     expect(told).toEqual(['welcome, resumed false, replaced false']);
   });
+});
+
+test('what a server sends beyond all measure is not heard', () => {
+  const heard: unknown[] = [];
+  const { connection } = connect((message) => heard.push(message));
+  ScriptedSocket.last.welcome();
+  const text = JSON.stringify({ type: 'spoken', utterance: 0, first_sample: 0, starts: [], times: [], more: 'x'.repeat(16_000) });
+  for (let i = 0; i < 100; i++) ScriptedSocket.last.onmessage?.({ data: text } as MessageEvent<string>);
+  expect(heard).toHaveLength(65); // a megabyte
+  vi.advanceTimersByTime(1000);
+  for (let i = 0; i < 100; i++) ScriptedSocket.last.onmessage?.({ data: text } as MessageEvent<string>);
+  expect(heard).toHaveLength(67); // and 32 KiB a second
+  connection.close();
 });

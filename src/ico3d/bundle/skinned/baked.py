@@ -192,11 +192,16 @@ def _spec(info: SkinnedInfo) -> Spec:
     }
 
 
-def _blocks(quats: np.ndarray) -> Iterator[np.ndarray]:
-    """Stored rotations (..., 4), some at a time: as numbers they are four times as large."""
-    rows = quats.reshape(-1, 4)
+def _blocks(rows: np.ndarray) -> Iterator[np.ndarray]:
+    """Rows of stored numbers, some at a time: worked out they are four times as large."""
     for first in range(0, len(rows), _AT_ONCE):
         yield rows[first : first + _AT_ONCE]
+
+
+def _reach(most: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """(N, 2) how far residual shapes (N, K, 6) move places and colours, with most (K,) of each."""
+    residual = np.einsum("k,nkd->nd", most, np.abs(shapes.astype(np.float32)))  # (N, 6)
+    return np.stack([residual[:, :3].max(axis=1), residual[:, 3:].max(axis=1)], 1)
 
 
 def _unevenness(quats: np.ndarray) -> float:
@@ -218,7 +223,7 @@ def _check_values(baked: BakedSkinned) -> None:
     _require(_ascends(baked.moving, info.num_joints), "'moving' must name joints in order")
     _require(_ascends(baked.known, info.num_frames), "'known' must name frames in order")
     for name in ("quats", "held", "rotations"):
-        off = max(map(_unevenness, _blocks(getattr(baked, name))))
+        off = max(map(_unevenness, _blocks(getattr(baked, name).reshape(-1, 4))))
         _require(off <= _UNEVEN, f"'{name}' holds one that is no rotation")
     bounds = {
         "means": _MAX_LENGTH,
@@ -233,8 +238,7 @@ def _check_values(baked: BakedSkinned) -> None:
     _require(baked.log_scales.max() <= _MAX_LOG_SCALE, f"exceeds exp({_MAX_LOG_SCALE:g}) m")
     _require(baked.kernel_width[0] > 0, "'kernel_width' must be more than 0")
     most = np.abs(baked.coefficients.astype(np.float64)).max(axis=0)  # (K,)
-    residual = np.einsum("k,nkd->nd", most, np.abs(baked.shapes.astype(np.float32)))  # (N, 6)
-    reach = np.stack([residual[:, :3].max(axis=1), residual[:, 3:].max(axis=1)], 1)  # (N, 2)
+    reach = np.concatenate([_reach(most, part) for part in _blocks(baked.shapes)])  # (N, 2)
     reach = reach * np.abs(baked.shape_scales.astype(np.float64)) * SCALE_UNITS
     moved = reach[:, 0].max() <= _MAX_LENGTH and reach[:, 1].max() <= _MAX_LOGIT
     _require(bool(moved), "its residual shapes are out of range")

@@ -1,14 +1,22 @@
 """Reads PyTorch's files of weights (.pth, .pt, .bin), in which torch unpacks what is packed."""
 
 import pickletools
+import re
 import zipfile
-from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from ico3d.common.unpacking.zips import check_directory
 from ico3d.errors import ModelError
 
+NEEDED = re.compile(
+    r"collections OrderedDict|torch (\w+Storage|[a-z]+\d+\w*|half|float|double|bool|long|Size)"
+    r"|torch device"
+    r"|torch\.storage \w+Storage|torch\.nn\.parameter Parameter"
+    r"|torch\._utils _rebuild_(tensor|tensor_v2|parameter|parameter_with_state)"
+)
+"""Names that files of weights give: kinds of numbers, and what makes tensors of those in the file.
+Of others some make as many bytes as they are told."""
 MOST_STEPS = 500_000
 """Steps of a pickle: each may make an object of 200 bytes. Models of thousands of tensors have some
 ten thousand."""
@@ -23,7 +31,7 @@ def check_unpacked(path: Path) -> None:
     """Refuses a file of weights that becomes much larger: torch itself packs none.
 
     Raises:
-        ModelError: If it is packed, has more objects than models have, or is damaged.
+        ModelError: If it is packed, names or has more than models do, or is damaged.
         OSError: If it cannot be read.
     """
     with path.open("rb") as file:
@@ -46,8 +54,11 @@ def _check_archive(path: Path, file: BinaryIO) -> None:
             raise ModelError(
                 f"{path} is packed, as no file is that PyTorch writes: it is not read."
             )
-        for entry in entries:
-            if entry.filename.endswith(".pkl"):
+        names = [entry.filename.lower() for entry in entries]
+        if len(set(names)) < len(names):  # torch does not tell them apart, and takes any
+            raise ModelError(f"{path} has two parts of one name: it is not read.")
+        for entry, name in zip(entries, names, strict=True):
+            if name.endswith(".pkl"):
                 with archive.open(entry) as pickled:
                     _check_steps(path, pickled, 1)
 
@@ -56,9 +67,17 @@ def _check_steps(path: Path, file: Any, pickles: int) -> None:
     """Reads some pickles one after the other, without making anything of them."""
     left = MOST_STEPS
     for _ in range(pickles):
-        left -= sum(1 for _ in islice(pickletools.genops(file), left + 1))
-        if left < 0:
-            raise ModelError(f"{path} holds more objects than a file of weights: it is not read.")
+        for step, argument, _ in pickletools.genops(file):
+            left -= 1
+            if left < 0:
+                raise ModelError(
+                    f"{path} holds more objects than a file of weights: it is not read."
+                )
+            if "GLOBAL" in step.name and not NEEDED.fullmatch(str(argument)):
+                what = str(argument)[:80]
+                raise ModelError(
+                    f"{path} names {what!r}, as no file of weights does: it is not read."
+                )
 
 
 def load_weights(path: Path, device: Any = "cpu") -> Any:

@@ -56,11 +56,14 @@ def check_directory(file: BinaryIO) -> None:
     """Refuses an archive of more entries than any of arrays or weights has.
 
     Raises:
-        ValueError: If it has more, or the file ends otherwise than an archive.
+        ValueError: If it has more, its directory does not end where the record of its end begins,
+            or the file ends otherwise than an archive.
     """
     found = directory(file)
     if found.count > MOST_ENTRIES or found.length > MOST_LENGTH:
         raise ValueError(f"it has more than {MOST_ENTRIES:,} entries")
+    if found.start + found.length != found.end:  # some readers go by one, some by the other
+        raise OtherEndError("its directory is not where it should be")
 
 
 def _far(file: BinaryIO, end: int) -> Directory | None:

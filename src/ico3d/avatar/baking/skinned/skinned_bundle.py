@@ -27,7 +27,9 @@ from ico3d.errors import BundleError
 from ico3d.motion.recorded.cut import Cut
 
 PROBES = 24
-"""Pictures from which the importance of Gaussians is estimated."""
+"""Pictures of the whole person from which the importance of Gaussians is estimated."""
+UPPER = 0.45
+"""Share of the person's height that as many more pictures show: what pages show at first."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +88,10 @@ def bake(
     exact = partial(body.window_gaussians, 0)
     with torch.no_grad():
         low, high = seen_box(exact, np.linspace(0, 1, MOMENTS).tolist())
-    ring = body_cost.ring_of_cameras(low, high)
-    span = body.windows[0]
-    views = body_cost.probe_views(ring, span, PROBES)
+    ring, span = body_cost.ring_of_cameras(low, high), body.windows[0]
+    waist = np.array([low[0], high[1] - UPPER * (high[1] - low[1]), low[2]])
+    near = body_cost.ring_of_cameras(waist, high)
+    views = [v for cameras in (ring, near) for v in body_cost.probe_views(cameras, span, PROBES)]
     poses = [(exact(view.tau), view.camera) for view in views]
     importance = gaussian_importance(poses, views[0].background, 0)
     clip = Clip(body.fps, staging.triple(low), staging.triple(high))
