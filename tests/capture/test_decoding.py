@@ -171,7 +171,8 @@ def test_a_large_file_of_another_kind_is_not_opened(tmp_path, monkeypatch):
         file.truncate(chunks.LARGEST_OTHER + 1)
     with pytest.raises(CaptureError, match="file is larger than is taken"):
         next(pictures_of(tmp_path, 25.0))
-    refuse_photograph(hole)  # as a film it is opened, or not
+    with pytest.raises(CaptureError, match="is a photograph"):
+        refuse_photograph(hole)
 
 
 def with_segments(count, content):

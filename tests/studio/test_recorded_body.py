@@ -16,6 +16,7 @@ from ico3d.studio.acting.gestures import act
 from ico3d.studio.acting.limbs import reach, split_twist
 from ico3d.studio.choice import load_subject
 from ico3d.studio.person import bends
+from ico3d.studio.person.npz_person import load_npz
 from ico3d.studio.person.skeleton import about
 from ico3d.studio.person.subject import Material
 from ico3d.studio.picture import paint
@@ -108,9 +109,9 @@ def test_at_rest_skin_stays_where_it_is(subject):
 
 @pytest.mark.skipif(not HUMAN.is_file(), reason="the shared subjects are not here")
 def test_a_jumper_turns_from_trunk_to_arm_over_a_hands_breadth(monkeypatch):
-    subject = load_subject(str(HUMAN), whole=True)
+    subject = load_npz(HUMAN, whole=True)
     monkeypatch.setattr(bends, "SOFTER", 0)
-    hard = load_subject(str(HUMAN), whole=True)
+    hard = load_npz(HUMAN, whole=True)
     steepest = []
     for bones in (subject.skeleton, hard.skeleton):
         np.testing.assert_allclose(bones.weights.sum(1), 1, atol=1e-5)

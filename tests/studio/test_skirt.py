@@ -99,7 +99,7 @@ def test_springs_and_viscosity_keep_the_momentum(seed):
     assert (np.ptp(velocity, axis=0) < spread).all()
     points = random.normal(size=(6, 3))
     middle = masses @ points
-    fabric._hold(points, pairs, np.ones(len(pairs)), np.full(len(pairs), 0.3), 1 / masses, 0.01)
+    fabric.hold(points, pairs, np.ones(len(pairs)), np.full(len(pairs), 0.3), 1 / masses, 0.01)
     np.testing.assert_allclose(masses @ points, middle, atol=1e-12)
 
 

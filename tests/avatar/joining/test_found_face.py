@@ -105,7 +105,7 @@ def test_a_head_without_landmarks_is_joined(
     assert TrainedHead.load(tmp_path / "out" / HEAD).landmarks is not None
     line = next(line for line in said if line.startswith("face: "))
     assert "found in 15 of 15 views drawn of it, which agree within" in line
-    assert re.search(r"the body's in 1[0-2] pictures of 3 moments, within", line)
+    assert re.search(r"the body's in (9|1[0-2]) pictures of 3 moments, within", line)
 
 
 def test_head_poses_that_are_not_the_heads(
