@@ -176,7 +176,7 @@ def test_a_file_of_more_gestures_than_anybody_makes_is_refused(clips):
     ("parser", "content", "why"),
     [
         ("parse_json", (1 << 21).to_bytes(8, "little") + b"[" * (1 << 21), "head is larger"),
-        ("bounded_head", bytes(files.MOST_BYTES + 1), "more than 16 MiB"),
+        ("bounded_head", bytes(files.MOST_BYTES + 1), "more than 4 MiB"),
     ],
 )
 def test_nothing_is_made_of_a_file_of_absurd_size(monkeypatch, parser, content, why):
