@@ -163,7 +163,7 @@ def opened(path: Path) -> Any:
                 set_threads(stream.codec_context)
                 check_held(str(path), stream.codec_context)
         for stream in container.streams.audio:
-            if stream.codec_context is not None and is_compressed(stream):
+            if stream.codec_context is not None and _is_compressed(stream):
                 stream.codec_context.options = {"max_samples": str(LONGEST_PIECE)}
     except CaptureError:
         container.close()
@@ -294,9 +294,9 @@ def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
 
 def _is_large(stream: Any, packet: Any) -> bool:
     """Whether a packet may hold many pieces of compressed sound, which are decoded at once."""
-    return is_compressed(stream) and packet.size > LARGEST_PACKET
+    return _is_compressed(stream) and packet.size > LARGEST_PACKET
 
 
-def is_compressed(stream: Any) -> bool:
+def _is_compressed(stream: Any) -> bool:
     """Whether a stream of PyAV is of sound that takes more memory than in its file."""
     return stream.type == "audio" and not stream.codec_context.name.startswith("pcm_")

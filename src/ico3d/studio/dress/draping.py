@@ -15,6 +15,7 @@ from ico3d.splat.cpu.compile import kernel
 from ico3d.studio.dress.fabric import GRAVITY, hold
 from ico3d.studio.dress.tailoring import limb_axes, tailored
 from ico3d.studio.person.edges import sides
+from ico3d.studio.person.scatter import areas
 from ico3d.studio.person.skeleton import Skeleton, turned
 from ico3d.studio.person.subject import Material, Subject
 from ico3d.studio.raster import vertex_normals
@@ -81,8 +82,7 @@ def _lowered(bones: Skeleton) -> tuple[np.ndarray, np.ndarray]:
         for side, mirror in (("L", 1), ("R", -1)):
             angles = np.radians(degrees) * (1, mirror, mirror)
             turns[0, bones.index(f"{name}.{side}")] = turned(angles[None])[0]
-    rows = bones.matrices(turns, np.zeros((1, 3)))[0, :, :3].reshape(-1, 12)
-    mixed = (bones.weights @ rows).reshape(-1, 3, 4)  # (V, 3, 4)
+    mixed = bones.mixed(bones.matrices(turns, np.zeros((1, 3)))[0])  # (V, 3, 4)
     return mixed[..., :3], mixed[..., 3]
 
 
@@ -112,9 +112,8 @@ def _settled(
 
 def _masses(places: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(N,) kilograms of cloth about each of the places (N, 3)."""
-    a, b, c = places[faces].transpose(1, 0, 2)
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)  # (F,)
-    share = np.bincount(faces.ravel(), np.repeat(area / 3, 3), len(places))
+    third = areas(places[faces]) / 6  # (F,) of a triangle, to each of its corners
+    share = np.bincount(faces.ravel(), np.repeat(third, 3), len(places))
     return DENSITY * np.maximum(share, 1e-7)
 
 
@@ -141,8 +140,7 @@ def _springs(
 
 def _over_edges(faces: np.ndarray) -> np.ndarray:
     """(E, 2) the tips of each two triangles that share an edge."""
-    edges, tips = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2), faces[:, [2, 0, 1]]
-    edges, tips = edges.reshape(-1, 2), tips.reshape(-1)
+    edges, tips = sides(faces), faces[:, [2, 0, 1]].ravel()
     order = np.lexsort(edges.T)
     edges, tips = edges[order], tips[order]
     shared = (edges[1:] == edges[:-1]).all(axis=1)

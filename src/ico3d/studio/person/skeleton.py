@@ -54,10 +54,14 @@ class Skeleton:
                 world[:, joint] = world[:, parent] @ local[:, joint]
         return world
 
+    def mixed(self, matrices: np.ndarray) -> np.ndarray:
+        """What moves each vertex, (V, 3, 4), for joint transforms (J, 4, 4); of their precision."""
+        rows = matrices[:, :3].reshape(len(matrices), 12)
+        return (self.weights @ rows).reshape(-1, 3, 4)
+
     def skinned(self, vertices: np.ndarray, matrices: np.ndarray) -> np.ndarray:
         """Vertices (V, 3) float32, moved by joint transforms (J, 4, 4)."""
-        rows = matrices[:, :3].reshape(len(matrices), 12).astype(np.float32)
-        mixed = (self.weights @ rows).reshape(-1, 3, 4)  # (V, 3, 4)
+        mixed = self.mixed(matrices.astype(np.float32))
         return np.einsum("vab,vb->va", mixed[..., :3], vertices) + mixed[..., 3]
 
 
