@@ -94,8 +94,8 @@ class Shot:
 
 HEAD = Shot(cameras=24, frames=1580, views=1, size=768, fps=12.5)
 """Two minutes of talk, each frame from another side; every second frame of a film would repeat."""
-BODY = Shot(cameras=24, frames=60, views=24, size=1200, fps=2.4, near=14)
-"""25 s, in which hands, head and feet do everything once; near cameras see what a page shows."""
+BODY = Shot(cameras=24, frames=80, views=24, size=1200, fps=2.4, near=14)
+"""33 s: all gestures, then hands, head and feet do everything once; near cameras see what a page shows."""
 TRAIN_HEAD = (
     "--steps 9000 --initial.gaussians 16000 --density.max-gaussians 28000 --density.until 5500 "
     "--density.gradient 0.00018 --density.min-contribution 0.15 --displacements 8 --smile"
@@ -151,7 +151,7 @@ class Demo:
         # moods and glances are nothing that a voice could drive, except for a smile, which is told
         self._record(person, work / "head-capture", "head", self.head_shot, "--manner", "smiling")
         body = (work / "body-capture", "body", self.body_shot)
-        self._record(person, *body, "--motion", "repertoire", "--manner", "friendly")
+        self._record(person, *body, "--motion", "conversation", "--manner", "friendly")
         self._train_head(work / "head-capture", work / "head")
         if not track_file(work / "body-capture").exists():
             write_body_track(true_track(work / "body-capture", person), work / "body-capture")

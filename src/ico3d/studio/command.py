@@ -47,11 +47,12 @@ class Synthetic:
     light: Literal["studio", "soft", "warm"] = "studio"
     """Neutral lamps (`studio`), the same through wide cloths (`soft`), or warm lamps from the
     other side (`warm`); the light becomes part of the recorded colours."""
-    motion: Literal["showcase", "talk", "walk", "sway", "repertoire"] = "talk"
+    motion: Literal["showcase", "talk", "walk", "sway", "repertoire", "conversation"] = "talk"
     """What a whole person does: `talk` stands and gestures in turn; `walk` walks in place;
     `repertoire` takes hands, head and chest through what they do in conversations, and walks;
-    `showcase` stands calmly, gestures and moves fast, a third of the time each; `sway` does the
-    same and turns the hips."""
+    `conversation` does the same after making each gesture that avatars make; `showcase` stands
+    calmly, gestures and moves fast, a third of the time each; `sway` does the same and turns the
+    hips."""
     garment: Literal["none", "skirt"] = "none"
     """What a whole person wears over the clothes: a `skirt` hangs, folds and swings, and the
     arms keep off it."""

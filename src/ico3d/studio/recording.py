@@ -22,9 +22,8 @@ from ico3d.common.camera import Camera
 from ico3d.common.files import holds, write_atomic
 from ico3d.common.sound import wav_bytes
 from ico3d.errors import SettingsError
-from ico3d.studio.acting.embody import embodied
+from ico3d.studio.acting.embody import MOTIONS, embodied
 from ico3d.studio.acting.gaze import GAZES, looking
-from ico3d.studio.acting.gestures import MOTIONS
 from ico3d.studio.acting.manner import MANNERS, mannered
 from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
 from ico3d.studio.choice import load_subject
@@ -169,6 +168,8 @@ def _check(recording: Recording) -> None:
             raise SettingsError(f"{name} must be at least 1, not {getattr(recording, name)}.")
     if recording.garment != "none" and not recording.whole:
         raise SettingsError(f"only a whole person wears a {recording.garment}: use --rig body.")
+    if recording.garment != "none" and recording.motion == "conversation":
+        raise SettingsError("arms hang close in a conversation: they would go through a skirt.")
     if not 0 <= recording.near < recording.cameras:
         raise SettingsError(
             f"near ({recording.near}) must be less than the number of cameras "

@@ -56,9 +56,9 @@ def _script(
 # Hands of somebody who is seen across a table are before the chest: lower ones would be hidden.
 _ELBOW = (0.5, -0.82, -0.3)
 
-_WAVE = Reach((0.12, 0.05, 0.42), (0.42, -0.9, -0.15), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
-_WAVE_IN = replace(_WAVE, place=(0.07, 0.06, 0.43), fingers=(-0.42, 1.0, 0.06))
-_WAVE_OUT = replace(_WAVE, place=(0.17, 0.04, 0.42), fingers=(0.48, 1.0, 0.06))
+_WAVE = Reach((0.05, 0.05, 0.42), (0.42, -0.9, -0.15), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
+_WAVE_IN = replace(_WAVE, place=(0.03, 0.04, 0.42), fingers=(-0.36, 1.0, 0.06))
+_WAVE_OUT = replace(_WAVE, place=(0.07, 0.04, 0.42), fingers=(0.4, 1.0, 0.06))
 
 _AIM = Reach((0.14, -0.34, 0.40), (0.55, -0.82, -0.3), (-0.1, 0.25, 1.0), (-0.8, -0.6, 0.1))
 _POINT = Reach((-0.03, -0.10, 0.83), _ELBOW, (-0.06, 0.06, 1.0), (-0.55, -0.83, 0.0), "point")
