@@ -1,7 +1,7 @@
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
-import { floatFromHalf } from '../src/half.ts';
+import { floatFromHalf, floatsFromHalves } from '../src/half.ts';
 import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, type SpeechMessage } from '../src/protocol.ts';
 import { decode, encode } from '../src/talk/wire.ts';
 import { runPython } from '../support/python.ts';
@@ -111,4 +111,24 @@ test('a message that is longer than any may be is not even parsed', () => {
   expect(() => decode(wide)).toThrow(/more than 65536 bytes/);
   expect(() => decode(wide.slice(0, -1))).toThrow(/bytes instead of/);
   expect(() => decode(`{"type": "state", "state": "${'a'.repeat(MAX_TEXT_FRAME)}"}`)).toThrow(/more than 16384 bytes/);
+});
+
+test('each message travels in its kind of frame, and a head is no longer than a text', () => {
+  const binary = (header: object, body = 0) => {
+    const text = new TextEncoder().encode(JSON.stringify(header));
+    const frame = new Uint8Array(4 + text.length + body);
+    new DataView(frame.buffer).setUint32(0, text.length, true);
+    frame.set(text, 4);
+    return frame.buffer;
+  };
+  expect(() => decode(binary({ type: 'answer', utterance: 5, first_sample: 0, text: 'a' }))).toThrow(/answer is no message of a binary frame/);
+  expect(() => decode('{"type": "speech", "pcm": [0], "expressions": [0, 0]}')).toThrow(/speech is no message of a text frame/);
+  const speech = { type: 'speech', utterance: 1, index: 0, first_sample: 0, first_expression: 0, pcm: [0], expressions: [0, 0] };
+  expect(decode(binary(speech))).toMatchObject({ type: 'speech' });
+  expect(() => decode(binary({ ...speech, more: 'a'.repeat(MAX_TEXT_FRAME) }))).toThrow(/more than 16384 bytes/);
+});
+
+test('many half floats are the same as each alone', () => {
+  const words = Uint16Array.from({ length: 1 << 16 }, (_, word) => word);
+  expect(floatsFromHalves(words)).toEqual(Float32Array.from(words, floatFromHalf));
 });

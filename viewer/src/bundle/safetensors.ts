@@ -1,11 +1,13 @@
 import { PageError } from '../errors.ts';
-import { floatFromHalf } from '../half.ts';
+import { floatsFromHalves } from '../half.ts';
+
+type Values = Float32Array | Int16Array | Uint16Array | Int8Array | Uint8Array; // half floats are widened
 
 /** One array of a safetensors file. */
 export interface Tensor {
   dtype: 'F32' | 'F16' | 'I16' | 'U16' | 'I8' | 'U8';
   shape: number[];
-  data: Float32Array | Int16Array | Uint16Array | Int8Array | Uint8Array; // half floats are widened on reading
+  readonly data: Values; // made when it is first asked for: nobody may want it
 }
 
 interface Entry {
@@ -78,13 +80,22 @@ function checkCover(spans: [number, number][], size: number, file: string): void
 }
 
 function readTensor(buffer: ArrayBuffer, base: number, { dtype, shape, data_offsets: [begin, end] }: Entry): Tensor {
-  const bytes = buffer.slice(base + begin, base + end); // a copy is aligned whatever the header's length
-  if (dtype === 'I8') return { dtype, shape, data: new Int8Array(bytes) };
-  if (dtype === 'U8') return { dtype, shape, data: new Uint8Array(bytes) };
-  if (dtype === 'I16') return { dtype, shape, data: new Int16Array(bytes) };
-  if (dtype === 'U16') return { dtype, shape, data: new Uint16Array(bytes) };
-  if (dtype === 'F16') return { dtype, shape, data: Float32Array.from(new Uint16Array(bytes), floatFromHalf) };
-  return { dtype: 'F32', shape, data: new Float32Array(bytes) };
+  let data: Values | undefined;
+  return {
+    dtype: dtype as Tensor['dtype'],
+    shape,
+    get data() {
+      return (data ??= valuesOf(dtype, buffer.slice(base + begin, base + end))); // a copy is aligned whatever the header's length
+    },
+  };
+}
+
+function valuesOf(dtype: string, bytes: ArrayBuffer): Values {
+  if (dtype === 'I8') return new Int8Array(bytes);
+  if (dtype === 'U8') return new Uint8Array(bytes);
+  if (dtype === 'I16') return new Int16Array(bytes);
+  if (dtype === 'U16') return new Uint16Array(bytes);
+  return dtype === 'F16' ? floatsFromHalves(new Uint16Array(bytes)) : new Float32Array(bytes);
 }
 
 /**

@@ -25,6 +25,8 @@ const SILENT = 4000; // close code: another line speaks
 /** Bytes of text, and of sound with its faces, that a server may send at once, and for long per second: an answer has 15 MB. */
 const TEXT = [1 << 20, 1 << 15] as const;
 const SOUND = [1 << 25, 1 << 18] as const;
+/** Frames likewise: an answer of five minutes has 3,100 pieces, and each frame costs the page time, whatever it holds. */
+const FRAMES = [4096, 256] as const;
 const LONGEST_HANDSHAKE = 8000; // ms, of a line that is to go on with a session
 
 /** The session is over. */
@@ -78,6 +80,7 @@ export class Connection {
   private readonly sound: SoundQueue;
   private readonly text = new Allowance(...TEXT);
   private readonly bytes = new Allowance(...SOUND);
+  private readonly frames = new Allowance(...FRAMES);
   private readonly silence = new Silence(() => this.fellSilent());
   private readonly url: () => string;
   private readonly events: ConnectionEvents;
@@ -193,7 +196,7 @@ export class Connection {
     if (this.welcomed) this.silence.heard();
     if (this.speaks()) this.goOn();
     // What is beyond is not heard: it may be packed a thousandfold, and is kept until it is spoken.
-    if (!(typeof frame === 'string' ? this.text.take(frame.length) : this.bytes.take(frame.byteLength))) return;
+    if (!this.frames.take(1) || !(typeof frame === 'string' ? this.text.take(frame.length) : this.bytes.take(frame.byteLength))) return;
     const message = decode(frame);
     if (message.type === 'welcome') this.welcome(message);
     else if (message.type === 'place') this.queue(message);

@@ -13,13 +13,19 @@ export interface Entry {
 export interface RecordEvents {
   /** An entry of this talk is new, or has changed. */
   changed(entry: Entry): void;
+  /** The oldest entry of this talk makes room for others. */
+  dropped(entry: Entry): void;
   /** Another talk begins, or what was said is shown no more. */
   renewed(): void;
 }
 
 const CUT = ' …';
 const ENDED = /[.!?。！？…]["'”’»)]*\s*$/; // answers come clause by clause
-const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]$/; // scripts that put no spaces between sentences
+const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]/; // of scripts that put no spaces between sentences
+const MOST_ENTRIES = 1000;
+/** Letters of an answer that are kept, and clauses of a sentence that goes on: servers say 4,000 at most. */
+const MOST_LETTERS = 20_000;
+const MOST_BEFORE = 4000;
 
 /** All that was said in a talk, as far as it was heard, and in the talks before it. */
 export class TalkRecord {
@@ -27,7 +33,7 @@ export class TalkRecord {
   /** Of talks before this one, which is another one for the avatar. */
   earlier: readonly Entry[];
   private readonly events: RecordEvents;
-  private answer: { utterance: number; entry: Entry; sentences: Map<number, Progress> } | null = null;
+  private answer: { utterance: number; entry: Entry; sentences: Map<number, Progress>; letters: number } | null = null;
   private resumed = false; // and nothing new was said
   private closed = false; // the talk is over, and another visitor may begin the next one
 
@@ -55,9 +61,11 @@ export class TalkRecord {
   heard(progress: Progress): void {
     if (this.answer?.utterance !== progress.utterance) {
       const entry: Entry = { who: 'avatar', at: new Date(), text: '', cut: false };
-      this.answer = { utterance: progress.utterance, entry, sentences: new Map() };
+      this.answer = { utterance: progress.utterance, entry, sentences: new Map(), letters: 0 };
     }
     const { entry, sentences } = this.answer;
+    if (!sentences.has(progress.first)) this.answer.letters += progress.text.length;
+    if (this.answer.letters > MOST_LETTERS) return;
     sentences.set(progress.first, progress);
     entry.text = joined([...sentences.values()].map(({ text, heard }) => text.slice(0, heard).trim()));
     if (!entry.text) return;
@@ -114,6 +122,7 @@ export class TalkRecord {
   private add(entry: Entry): void {
     this.entries.push(entry);
     this.events.changed(entry);
+    if (this.entries.length > MOST_ENTRIES) this.events.dropped(this.entries.shift()!);
   }
 }
 
@@ -134,7 +143,7 @@ export class RunningSentence {
     if (present && (present.utterance !== progress.utterance || present.first !== progress.first)) {
       const follows = present.utterance === progress.utterance && present.first < progress.first; // numbers may start anew
       const goesOn = follows && !ENDED.test(present.text);
-      this.before = goesOn ? joined([this.before, present.text.trim()]) : '';
+      this.before = goesOn ? joined([this.before, present.text.trim()]).slice(-MOST_BEFORE) : '';
     }
     this.present = progress;
     const text = joined([this.before, progress.text]);
@@ -143,5 +152,5 @@ export class RunningSentence {
 }
 
 function joined(sentences: readonly string[]): string {
-  return sentences.filter(Boolean).reduce((text, sentence) => (!text || JOINED.test(text) ? text + sentence : `${text} ${sentence}`), '');
+  return sentences.filter(Boolean).reduce((text, sentence) => (!text || JOINED.test(text.at(-1)!) ? text + sentence : `${text} ${sentence}`), '');
 }

@@ -1,4 +1,4 @@
-import { floatFromHalf } from '../half.ts';
+import { floatsFromHalves } from '../half.ts';
 import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, SERVER_TYPES, TENSORS, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
 
 /** What is done with each of some messages: the compiler misses none. */
@@ -42,10 +42,11 @@ function joinFrame(header: Uint8Array, parts: Int16Array[]): ArrayBuffer {
 
 /** A frame as a message; throws an Error on one that is not from this protocol. */
 export function decode(frame: string | ArrayBuffer): ServerMessage {
-  if (typeof frame === 'string') return known(parse(frame, MAX_TEXT_FRAME));
+  if (typeof frame === 'string') return checked(parse(frame), false);
   if (frame.byteLength > MAX_BINARY_FRAME) throw new Error(`a message of more than ${MAX_BINARY_FRAME} bytes`);
   const length = new DataView(frame).getUint32(0, true);
-  const header = parse(new TextDecoder().decode(new Uint8Array(frame, 4, length)), MAX_BINARY_FRAME);
+  const header = parse(new TextDecoder().decode(new Uint8Array(frame, 4, length)));
+  const message = checked(header, true);
   let at = 4 + length;
   for (const [field, kind] of TENSORS[header.type] ?? []) {
     const shape = header[field];
@@ -56,11 +57,11 @@ export function decode(frame: string | ArrayBuffer): ServerMessage {
     at = end;
   }
   if (at !== frame.byteLength) throw new Error(`${header.type}: ${frame.byteLength} bytes instead of ${at}`);
-  return known(header);
+  return message;
 }
 
-function parse(text: string, most: number): Header {
-  if (text.length > most) throw new Error(`a message of more than ${most} bytes`);
+function parse(text: string): Header {
+  if (text.length > MAX_TEXT_FRAME) throw new Error(`a text of more than ${MAX_TEXT_FRAME} bytes`);
   return JSON.parse(text) as Header;
 }
 
@@ -69,13 +70,15 @@ function isShape(sizes: unknown, axes: number): sizes is number[] {
   return Array.isArray(sizes) && sizes.length === axes && sizes.every((size) => Number.isInteger(size) && size >= 0 && size <= MAX_BINARY_FRAME);
 }
 
-function known(header: Header): ServerMessage {
+/** What has no arrays travels as text: of that, less may come than of sound. */
+function checked(header: Header, binary: boolean): ServerMessage {
   if (!SERVER_TYPES.includes(header.type)) throw new Error(`unknown message ${header.type}`);
+  if (Object.hasOwn(TENSORS, header.type) !== binary) throw new Error(`${header.type} is no message of a ${binary ? 'binary' : 'text'} frame`);
   return header as unknown as ServerMessage;
 }
 
 /** Rows that hold nothing are none: nobody sent them, and each would take up memory. */
 function matrix(shape: number[], words: Uint16Array): Matrix {
   const [rows = 0, columns = 0] = shape;
-  return { rows: columns && rows, columns, values: Float32Array.from(words, floatFromHalf) };
+  return { rows: columns && rows, columns, values: floatsFromHalves(words) };
 }

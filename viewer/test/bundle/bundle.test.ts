@@ -1,6 +1,6 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { describe, expect, test } from 'vitest';
+import { describe, expect, test, vi } from 'vitest';
 import { identityOf, loadManifest } from '../../src/bundle/load.ts';
 import { blinkIndices, checkManifest } from '../../src/bundle/manifest.ts';
 import { parseSafetensors } from '../../src/bundle/safetensors.ts';
@@ -94,6 +94,16 @@ describe('a damaged bundle is refused in one sentence', () => {
     ['no camera', () => checkManifest({ ...manifest, camera: null }), /camera/],
   ];
   test.each(cases)('%s', (_, act, sentence) => expect(act).toThrow(sentence));
+});
+
+test('the numbers of a tensor are made once, when somebody asks for them', () => {
+  const slice = vi.spyOn(ArrayBuffer.prototype, 'slice');
+  const tensors = parseSafetensors(headFile, 'head');
+  expect(slice).not.toHaveBeenCalled();
+  const means = tensors.get('means')!;
+  expect(means.data).toBe(means.data);
+  expect(slice).toHaveBeenCalledOnce();
+  slice.mockRestore();
 });
 
 /** So many files of so many bytes. */

@@ -12,7 +12,7 @@ function listen() {
   let at: { utterance: number; seconds: number } | null = null;
   const told: string[] = [];
   const changes: Entry[] = [];
-  const record = new TalkRecord({ changed: (entry) => changes.push(entry), renewed: () => changes.splice(0) });
+  const record = new TalkRecord({ changed: (entry) => changes.push(entry), dropped: () => {}, renewed: () => changes.splice(0) });
   const captions = new Captioning(() => at, {
     heard: (progress: Progress) => {
       told.push(progress.text.slice(0, progress.heard));

@@ -300,3 +300,19 @@ test('what a server sends beyond all measure is not heard', () => {
   expect(heard).toHaveLength(67); // and 32 KiB a second
   connection.close();
 });
+
+test('of frames without number, however small, 4,096 are heard at once, and 256 a second', () => {
+  const heard: unknown[] = [];
+  const { connection } = connect((message) => heard.push(message));
+  ScriptedSocket.last.welcome(); // is one of them
+  const text = JSON.stringify({ type: 'transcript', text: '1', final: true });
+  const flood = () => {
+    for (let i = 0; i < 5000; i++) ScriptedSocket.last.onmessage?.({ data: text } as MessageEvent<string>);
+  };
+  flood();
+  expect(heard).toHaveLength(4095);
+  vi.advanceTimersByTime(1000);
+  flood();
+  expect(heard).toHaveLength(4095 + 256);
+  connection.close();
+});

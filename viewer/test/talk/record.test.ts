@@ -41,7 +41,7 @@ test('scripts without spaces get none', () => {
 });
 
 test('a talk is earlier than the next one; of one in which the visitor said nothing no line stays', () => {
-  const record = new TalkRecord({ changed: () => {}, renewed: () => {} }, [line('before')]);
+  const record = new TalkRecord({ changed: () => {}, dropped: () => {}, renewed: () => {} }, [line('before')]);
   const texts = () => [record.earlier, record.entries, record.lasting].map((lines) => lines.map(({ text }) => text));
   const greet = () => record.heard({ utterance: 0, first: 0, text: 'Hello.', heard: 6 });
   record.begin(false);
@@ -59,7 +59,7 @@ test('a talk is earlier than the next one; of one in which the visitor said noth
 
 test('after the server has ended a talk nothing of it stays, nor after it was cleared', () => {
   const renewed = vi.fn();
-  const record = new TalkRecord({ changed: () => {}, renewed }, [line('before')]);
+  const record = new TalkRecord({ changed: () => {}, dropped: () => {}, renewed }, [line('before')]);
   record.begin(false);
   record.asked('Who?');
   record.close();
@@ -73,4 +73,28 @@ test('after the server has ended a talk nothing of it stays, nor after it was cl
   record.heard({ utterance: 1, first: 0, text: 'I am Ada.', heard: 9 }); // what is still being said
   record.asked('Still there?');
   expect(record.lasting.map(({ text }) => text)).toEqual(['I am Ada.', 'Still there?']);
+});
+
+test('a record has room for a thousand entries, and drops the oldest', () => {
+  const dropped: Entry[] = [];
+  const record = new TalkRecord({ changed: () => {}, dropped: (entry) => dropped.push(entry), renewed: () => {} });
+  for (let i = 0; i < 1003; i++) record.asked(`${i}`);
+  expect(record.entries.length).toBe(1000);
+  expect(dropped.map(({ text }) => text)).toEqual(['0', '1', '2']);
+});
+
+test('an answer without an end is kept as far as twenty thousand letters, quickly', () => {
+  const record = new TalkRecord({ changed: () => {}, dropped: () => {}, renewed: () => {} });
+  const sentence = new RunningSentence();
+  const text = 'a'.repeat(99);
+  const begin = performance.now();
+  for (let i = 0; i < 1000; i++) {
+    const progress = { utterance: 0, first: i, text, heard: 99 };
+    record.heard(progress);
+    expect(sentence.follow(progress).text.length).toBeLessThanOrEqual(4100);
+  }
+  expect(record.answered.length).toBe(202 * 100 - 1);
+  expect(performance.now() - begin).toBeLessThan(2000); // it was half a minute
+  record.over(0, true);
+  expect(record.answered.endsWith('a …')).toBe(true);
 });

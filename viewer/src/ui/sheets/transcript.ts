@@ -46,7 +46,7 @@ export class Transcript {
     this.talker = talker;
     this.cleared = cleared;
     this.list = byId(page, 'record');
-    const events = { changed: (entry: Entry) => this.changed(entry), renewed: () => this.renewed() };
+    const events = { changed: (entry: Entry) => this.changed(entry), dropped: (entry: Entry) => this.dropped(entry), renewed: () => this.renewed() };
     this.record = new TalkRecord(events, talker.kept.read());
     this.keep = keepUp(talker.kept, () => this.record.lasting, signal);
     byId(page, 'drawer-kept').hidden = !talker.kept.outlastsPage;
@@ -134,6 +134,12 @@ export class Transcript {
   private changed(entry: Entry): void {
     this.show(entry);
     this.keep();
+  }
+
+  private dropped(entry: Entry): void {
+    this.rows.get(entry)?.remove();
+    this.rows.delete(entry);
+    this.announced = Math.max(0, this.announced - 1);
   }
 
   private show(entry: Entry): void {
