@@ -304,6 +304,7 @@ test('what a server sends beyond all measure is not heard', () => {
 test('of frames without number, however small, 4,096 are heard at once, and 256 a second', () => {
   const heard: unknown[] = [];
   const { connection } = connect((message) => heard.push(message));
+  ScriptedSocket.last.beats = false;
   ScriptedSocket.last.welcome(); // is one of them
   const text = JSON.stringify({ type: 'transcript', text: '1', final: true });
   const flood = () => {
