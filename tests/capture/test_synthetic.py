@@ -4,7 +4,9 @@ import json
 import struct
 import zlib
 
+import numpy as np
 import pytest
+from safetensors.numpy import load_file, save_file
 
 from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError
@@ -84,3 +86,18 @@ def test_frames_of_thousands_of_tensors_are_not_read(folder):
     write_crowded(folder / "frames.safetensors")
     with pytest.raises(CaptureError, match="is missing or damaged"):
         open_capture(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("points", np.full((9, 3), np.nan, np.float16), ("points", "must not be float16")),
+        ("views", np.ones((3, 1)), ("views", "must not be float64")),
+        ("eyes", np.where(np.arange(3)[:, None] < 2, 0.0, np.full(7, np.nan)), ("row 2", "eyes")),
+    ],
+)
+def test_frames_are_of_the_types_that_recordings_have(folder, name, value, words):
+    """Of half floats without a number a list of twenty times their size was made."""
+    file = folder / "frames.safetensors"
+    save_file(load_file(file) | {name: value}, file)
+    fails(lambda: open_capture(folder), *words)

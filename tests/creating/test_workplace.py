@@ -76,6 +76,20 @@ def test_an_avatar_that_was_written_right_before_a_kill_is_our_own(settings):
         assert not place.is_done(settings)
 
 
+def test_another_maker_or_body_is_another_avatar(settings, tmp_path):
+    body = tmp_path / "body.ico3d"  # a bundle may be a folder
+    body.mkdir()
+    (body / "manifest.json").write_text("{}")
+    with workplace(settings) as place:
+        settings.out.write_bytes(b"an avatar")
+        told = _other(settings, body=str(body), made_by="Somebody")
+        place.note_done(told)
+        assert place.is_done(told)
+        assert not place.is_done(_other(told, made_by="Somebody else"))
+        (body / "manifest.json").write_text('{"name": "Another"}')
+        assert not place.is_done(told)
+
+
 def test_an_avatar_made_by_others_is_not_written_over(settings):
     settings.out.write_bytes(b"somebody else's")
     _refused(settings, SettingsError, "exists already")

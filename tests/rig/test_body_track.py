@@ -95,6 +95,8 @@ def damaged(track, tmp_path, arrays=(), **about):
         ("rotations", np.zeros((5, 3, 4), np.float32), r"\(5, 2, 4\)"),
         ("roots", np.full((5, 3), 1e6, np.float32), "farther than"),
         ("faces", np.array([[0, 1, 4]], np.int32), "vertex that is not there"),
+        ("rotations", np.zeros((5, 2, 4), np.uint8), "must be float32"),
+        ("roots", np.zeros((5, 3), np.float16), "must be float32"),
         ("vertex_joints", np.full((4, 4), 2, np.uint8), "joint that is not there"),
         ("vertex_joints", np.full((4, 4), -(2**30)), "must be uint8"),
         ("faces", np.full((1, 3), 0.5), "must be int32"),

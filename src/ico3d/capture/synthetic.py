@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from safetensors import SafetensorError
+from safetensors import SafetensorError, safe_open
 
 from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
@@ -11,10 +11,10 @@ from ico3d.capture.decoding import DAMAGED, open_picture, unit
 from ico3d.capture.multiview.description import MOST_FRAMES, number
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
-from ico3d.common.files import json_of, read_small
+from ico3d.common.files import check_regular, json_of
 from ico3d.common.people.stated import NOBODY
 from ico3d.common.sound import WAV_ERRORS, open_claim, open_wav
-from ico3d.common.unpacking.heads import load_bounded
+from ico3d.common.unpacking.heads import check_head
 from ico3d.errors import CaptureError
 
 FORMAT, VERSION = "ico3d-synthetic", 2
@@ -160,8 +160,14 @@ class SyntheticCapture(RecordedCapture):
     def _read_frames(self) -> dict[str, np.ndarray]:
         file = self.path / "frames.safetensors"
         try:
-            arrays = load_bounded(read_small(file, most=LARGEST))
-        except (OSError, SafetensorError, ValueError) as error:
+            check_regular(file)
+            if file.stat().st_size > LARGEST:
+                raise ValueError("it is larger than a recording's")
+            check_head(file)
+            with safe_open(file, "numpy") as content:
+                names = list(content.keys())
+                arrays = {name: content.get_tensor(name) for name in names}
+        except (OSError, SafetensorError, ValueError, TypeError, AttributeError) as error:
             raise CaptureError(f"{file} is missing or damaged: record again.") from error
         frames, shapes = self.num_frames, len(self._about["blendshape_names"])
         expected = {
@@ -187,8 +193,12 @@ def _check_array(
     )
     if not fits:
         raise CaptureError(f"{file}: '{name}' must have shape {shape}, but has {array.shape}.")
-    if not np.isfinite(array).all():
-        bad = int(np.argwhere(~np.isfinite(array))[0][0])
+    kinds = (np.bool_, np.uint8) if name == "views" else (np.float32, np.float64)
+    if array.dtype not in kinds:
+        raise CaptureError(f"{file}: '{name}' must not be {array.dtype}: record again.")
+    finite = np.isfinite(array)
+    if not finite.all():
+        bad = int(np.argmin(finite.all(axis=tuple(range(1, finite.ndim)))))
         raise CaptureError(f"{file}: row {bad} of '{name}' is not finite: record again.")
 
 

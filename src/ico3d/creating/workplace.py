@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from ico3d.avatar.embodying.look import UNCHANGED
+from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.voice import VOICE as TONE
 from ico3d.common.files import check_regular, read_object, write_atomic
@@ -166,10 +167,16 @@ def _wanted(settings: CreateSettings, bundle: Path) -> dict:
         "quality": settings.quality,
         "persona": None if persona is None else _digest(persona),
         "bundle": _digest(bundle),
-        **({} if body is None else {"body": _digest(bundle_path(body))}),
+        **({} if body is None else {"body": _bundle_digest(bundle_path(body))}),
         **({"voice": voice} if is_stated(voice) else {}),
         **({} if settings.look == UNCHANGED else {"look": plain(settings.look)}),
+        **({"made_by": settings.made_by} if settings.made_by else {}),
     }
+
+
+def _bundle_digest(bundle: Path) -> str:
+    """SHA-256 that tells bundles apart; of one that is a folder, of the list of what is in it."""
+    return _digest(bundle / MANIFEST if bundle.is_dir() else bundle)
 
 
 def _digest(file: Path) -> str:

@@ -23,8 +23,17 @@ VERSION = 1
 """Version of the file."""
 MOST_BYTES = 1 << 28
 """Largest size in bytes of a file: two hours of 80 joints take as much."""
-NUMBERS = {"faces": np.dtype(np.int32), "vertex_joints": np.dtype(np.uint8)}
-"""Types of the arrays of indices."""
+NUMBERS = {
+    "joints": np.float64,
+    "rotations": np.float32,
+    "roots": np.float32,
+    "fitted": np.uint8,
+    "vertices": np.float32,
+    "faces": np.int32,
+    "vertex_joints": np.uint8,
+    "vertex_weights": np.float32,
+}
+"""Types of the arrays: of narrower ones, what is computed would be many times as large."""
 _DAMAGE = (ValueError, KeyError, TypeError, OverflowError, AttributeError)
 """What damaged files raise; AttributeError for kinds of numbers that numpy has not."""
 LONGEST = 1e3
@@ -110,7 +119,7 @@ class BodyTrack:
             "vertices": self.vertices.astype(np.float32),
             "faces": self.faces.astype(np.int32),
             "vertex_joints": self.binding.joints,
-            "vertex_weights": self.binding.weights,
+            "vertex_weights": self.binding.weights.astype(np.float32),
         }
         arrays = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
         return save(arrays, {"body_track": json.dumps(about)})
@@ -203,6 +212,9 @@ def _read(file: Path) -> BodyTrack:
     for name, shape in shapes.items():
         if arrays[name].shape != shape:
             raise ValueError(f"'{name}' must be {shape}, found {arrays[name].shape}")
+        if arrays[name].dtype != NUMBERS[name]:
+            kind = np.dtype(NUMBERS[name])
+            raise ValueError(f"'{name}' must be {kind}, found {arrays[name].dtype}")
         if not np.isfinite(arrays[name]).all():
             raise ValueError(f"'{name}' holds NaN or infinity")
     _check_values(arrays, len(rig), vertices)
@@ -231,9 +243,6 @@ def _check_values(arrays: dict[str, np.ndarray], joints: int, vertices: int) -> 
     for name in ("roots", "vertices"):
         if np.abs(arrays[name]).max(initial=0) > LONGEST:
             raise ValueError(f"'{name}' reaches farther than {LONGEST:g} m")
-    for name, kind in NUMBERS.items():
-        if arrays[name].dtype != kind:
-            raise ValueError(f"'{name}' must be {kind}, found {arrays[name].dtype}")
     faces, weights = arrays["faces"], arrays["vertex_weights"]
     if faces.size and not (faces.min() >= 0 and faces.max() < vertices):
         raise ValueError("'faces' names a vertex that is not there")

@@ -1,6 +1,5 @@
 """Pretrained speech encoders by name, with frozen weights: built-in, SyncTalk's, HuBERT (torch)."""
 
-import hashlib
 import warnings
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,6 +12,7 @@ from torch import nn
 
 from ico3d.common.catalogue.table import TABLE
 from ico3d.common.downloads.fetching import sha256
+from ico3d.common.files import read_small
 from ico3d.common.unpacking.heads import MOST_HEAD, bounded_head
 from ico3d.common.unpacking.weights import load_weights
 from ico3d.common.weights import model_file, model_of
@@ -117,7 +117,7 @@ def load_builtin(path: Path) -> FrozenEncoder:
     except ValueError as error:
         raise ModelError(f"{path} holds no encoder: {error}.") from error
     state = {key: value.float() for key, value in load(data).items() if "readout" not in key}
-    encoder = _frozen("builtin", BuiltinEncoder(), state, data, path)
+    encoder = _frozen("builtin", BuiltinEncoder(), state, sha256(path), path)
     read = [load(data).get(f"readout.articulation.{name}") for name in ("weight", "bias")]
     if read[0] is None or read[1] is None:
         return encoder
@@ -131,16 +131,14 @@ def load_ave(path: Path) -> FrozenEncoder:
         ModelError: If the file cannot be read or does not hold this encoder.
     """
     warnings.warn(TABLE["ave"].notice, stacklevel=2)
-    data = _read(path)
     try:
-        state = load_weights(path)
+        prefix = "audio_encoder."
+        state = {key.removeprefix(prefix): value for key, value in load_weights(path).items()}
     except ModelError:
         raise
     except Exception as error:
         raise ModelError(f"{path} cannot be read as weights: {error}") from None
-    prefix = "audio_encoder."
-    state = {key.removeprefix(prefix): value for key, value in state.items()}
-    return _frozen("ave", AudioEncoder(), state, data, path)
+    return _frozen("ave", AudioEncoder(), state, sha256(path), path)
 
 
 def load_hubert(folder: Path) -> FrozenEncoder:
@@ -160,15 +158,15 @@ def _hubert(path: Path, written: int) -> FrozenEncoder:
 
 
 def _read(path: Path) -> bytes:
-    """The bytes of a weight file."""
+    """The bytes of a file of the built-in encoder."""
     try:
-        return path.read_bytes()
+        return read_small(path)
     except OSError as error:
         raise ModelError(f"the speech encoder {path} cannot be read: {error.strerror}.") from None
 
 
 def _frozen(
-    name: str, network: nn.Module, state: dict[str, torch.Tensor], data: bytes, path: Path
+    name: str, network: nn.Module, state: dict[str, torch.Tensor], digest: str, path: Path
 ) -> FrozenEncoder:
     """Puts weights into a network and takes their gradients away."""
     try:
@@ -177,4 +175,4 @@ def _frozen(
         raise ModelError(f"{path} does not hold the speech encoder '{name}'.") from None
     network.eval().requires_grad_(False)
     size = int(getattr(network, "size"))  # noqa: B009 - nn.Module hides class attributes
-    return FrozenEncoder(name, size, hashlib.sha256(data).hexdigest(), network)
+    return FrozenEncoder(name, size, digest, network)

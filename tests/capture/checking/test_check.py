@@ -1,12 +1,14 @@
 import numpy as np
 import pytest
 from PIL import Image
+from safetensors.numpy import load_file, save_file
 
 from ico3d.capture.checking import head
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.cli import main
 from support.recordings import portrait_folder
+from support.recordings.synthetic_folder import write_synthetic
 
 
 def _levels(folder):
@@ -40,6 +42,14 @@ def test_empty_mask_is_an_error(folder):
     for file in (folder / "parsing").iterdir():
         Image.fromarray(np.full((64, 64, 3), 255, np.uint8)).save(file)
     assert _levels(folder)["masks"].level == "error"
+
+
+def test_a_recording_without_a_picture_is_told(tmp_path):
+    write_synthetic(tmp_path)
+    file = tmp_path / "frames.safetensors"
+    frames = load_file(file)
+    save_file(frames | {"views": np.zeros_like(frames["views"])}, file)
+    assert _levels(tmp_path)["masks"].text == "there is no picture"
 
 
 def test_damaged_picture_is_named(folder):

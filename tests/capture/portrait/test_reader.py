@@ -193,6 +193,18 @@ def test_pickled_arrays_are_refused(folder):
     _fails(folder, "bs.npy", "cannot be read")
 
 
+def test_a_hole_of_bytes_counts_as_what_it_would_become(folder):
+    """4 kB of a disk, 256 MiB of bytes, which were copied as numbers of four."""
+    head = _npy(_shaped("'|u1'", f"({(1 << 28) // 52},52)"))
+    with (folder / "bs.npy").open("wb") as file:
+        file.write(head)
+        file.truncate(len(head) + (1 << 28))
+    tracemalloc.start()
+    _fails(folder, "bs.npy", "too many")
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+
+
 def _npy(head: str, data: bytes = b"") -> bytes:
     """A .npy file with any header."""
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head) + 1) + head.encode() + b"\n" + data

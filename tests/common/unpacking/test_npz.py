@@ -94,6 +94,22 @@ def test_a_subject_of_many_shapes_or_joints_is_refused(tmp_path, vertices, shape
         load_npz(file)
 
 
+def test_a_subject_of_many_triangles_or_influences_is_refused(tmp_path):
+    """Each edge would get a row of numbers for all shapes, each influence one of a joint."""
+    names = {"bs_names": np.zeros(300, "U1"), "joint_names": np.zeros(2, "U1")}
+    arrays = names | {"verts": np.zeros((500, 3), "u1"), "w_idx": np.zeros((500, 4), "u1")}
+    arrays |= {"faces": np.zeros((60_000, 3), "u2"), "w_val": np.zeros((500, 4), "f2")}
+    with pytest.raises(CaptureError, match="300 shapes of 60000 triangles are more than is taken"):
+        load_npz(write(tmp_path / "a.npz", **arrays))
+    arrays["faces"] = arrays["faces"][:10]
+    wide = arrays | {name: np.zeros((500, 17), "u1") for name in ("w_idx", "w_val")}
+    with pytest.raises(CaptureError, match="more than 16 joints each"):
+        load_npz(write(tmp_path / "b.npz", **wide))
+    odd = arrays | {"w_val": np.zeros((500, 3), "f2")}
+    with pytest.raises(CaptureError, match="more than 16 joints each"):
+        load_npz(write(tmp_path / "c.npz", **odd))
+
+
 def test_a_cached_flow_of_more_than_was_measured_is_damaged(tmp_path, peak):
     file = write(tmp_path / "a.npz", energy=np.zeros(3), moving=np.zeros((3, 1 << 24), "u1"))
     tracemalloc.reset_peak()

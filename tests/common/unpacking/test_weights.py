@@ -1,13 +1,15 @@
 """Weights that someone has packed are not unpacked: torch would do so without a bound."""
 
 import pickle
+import tarfile
 import zipfile
 
 import pytest
 import torch
 from safetensors.torch import save_file
 
-from ico3d.common.unpacking.weights import MOST_STEPS, check_unpacked, load_weights
+from ico3d.common.unpacking.pickles import MOST_STEPS
+from ico3d.common.unpacking.weights import check_unpacked, load_weights
 from ico3d.errors import ModelError
 from ico3d.measure.sync.network import load_state
 from ico3d.speech.encoder import load_ave
@@ -123,7 +125,82 @@ def test_nothing_is_made_of_a_number_alone(tmp_path, module, how):
     else:
         named = b"\x8c" + bytes([len(module)]) + module.encode() + b"\x8c\tbytearray\x93"
     file = archive_of(tmp_path / "a.pt", b"\x80\x04" + named + b"J\0\0\0\x10\x85R.")
-    with pytest.raises(ModelError, match="as no file of weights does"):
+    with pytest.raises(ModelError, match="no file of weights"):
+        load_weights(file)
+
+
+ORDERED, SIZE = b"ccollections\nOrderedDict\n", b"ctorch\nSize\n"
+MANY = b"](" + b"".join(b"K" + bytes([i]) + b"N\x86" for i in range(100)) + b"e"
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        (MANY + b"q\1" + ORDERED + b"h\1\x85R", "copies a dictionary"),
+        (ORDERED + b")R}(" + b"K\1N" * 100 + b"ub", "another state"),
+        (b"(" + b"K\1" * 100 + b"tq\1" + SIZE + b"h\1\x85R", "more axes"),
+        (MANY + b"q\1" + SIZE + b"h\1\x85R", "more axes"),
+        (b"ctorch\nFloatStorage\nJ\0\0\0\x10\x85R", "calls 'torch FloatStorage'"),
+        (b"ctorch.nn.parameter\nParameter\n)\x81", "NEWOBJ"),
+        (b"}))" + b"q\1h\1\x86" * 30 + b"Ns", "a key is a tuple"),
+        (b"R", "do not fit"),
+        (b"K\1K\1a", "do not fit"),
+    ],
+)
+def test_nothing_is_copied_or_made_but_tensors(tmp_path, steps, words):
+    """200 kB copied a list of theirs until 8 GB were full; keys of keys are never at their end."""
+    file = archive_of(tmp_path / "a.pt", b"\x80\x02](" + steps + b"e.")
+    with pytest.raises(ModelError, match=words):
+        load_weights(file)
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_trainings_are_read(tmp_path, old):
+    network = torch.nn.Sequential(torch.nn.Conv1d(2, 3, 3), torch.nn.BatchNorm1d(3))
+    optimiser = torch.optim.AdamW(network.parameters())
+    network(torch.randn(2, 2, 8)).sum().backward()
+    optimiser.step()
+    state = {
+        "network": network.state_dict(),
+        "optimiser": optimiser.state_dict(),
+        "size": torch.Size([3, 4]),
+        "kind": torch.float16,
+        "place": torch.device("cpu"),
+        "parameter": torch.nn.Parameter(torch.ones(2)),
+        "settings": {"steps": 1 << 70, "rate": 0.1, "names": ("a", None, True)},
+    }
+    file = tmp_path / "a.pth"
+    torch.save(state, file, _use_new_zipfile_serialization=not old)
+    read = load_weights(file)
+    assert read["network"].keys() == network.state_dict().keys()
+    assert read["network"]._metadata == network.state_dict()._metadata
+    assert read["settings"] == state["settings"] and read["size"] == (3, 4)
+    optimiser.load_state_dict(read["optimiser"])
+
+
+def hole(path, head, size):
+    with path.open("wb") as file:
+        file.write(head)
+        file.truncate(size)
+    return path
+
+
+def test_a_hole_is_not_gone_through(tmp_path):
+    """4 kB of a disk that say they are a text of 2 GB."""
+    text = b"X" + (2_000_000_000).to_bytes(4, "little")
+    for head in (b"\x80\x02" + text, pickle.dumps(0x1950A86A20F9469CFC6C, 2) + b"\x80\x02" + text):
+        file = hole(tmp_path / "a.pt", head, 2_000_000_100)
+        with pytest.raises(ModelError, match="damaged file of weights"):
+            load_weights(file)
+
+
+@pytest.mark.parametrize("kind", [tarfile.GNUTYPE_LONGNAME, tarfile.XHDTYPE, tarfile.REGTYPE])
+def test_a_file_that_is_a_tar_as_well_is_refused(tmp_path, kind):
+    """torch would read the whole of a first member, 2 GB, before anything else."""
+    member = tarfile.TarInfo(pickle.dumps(0x1950A86A20F9469CFC6C, 2).decode("latin1"))
+    member.size, member.type = 2_000_000_000, kind
+    file = hole(tmp_path / "a.pt", member.tobuf(tarfile.GNU_FORMAT, "latin1"), 2_000_001_024)
+    with pytest.raises(ModelError, match="two kinds of files"):
         load_weights(file)
 
 

@@ -127,6 +127,8 @@ def _masks(capture: Capture) -> Finding:
             return Finding("masks", "error", f"{where}: the mask is empty")
         shares.append(mask.mean())
         heads.append(head.mean())
+    if not shares:
+        return Finding("masks", "error", "there is no picture")
     text = f"person {np.mean(shares):.0%} of the picture"
     if capture.world_from_head(0) is not None:
         text += f", head {np.mean(heads):.0%}"

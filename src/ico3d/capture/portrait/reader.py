@@ -198,7 +198,9 @@ class TalkingPortrait(RecordedCapture):
         wanted = [names.index(name) for name in AU_COLUMNS]
         table = _reading(
             path,
-            lambda: np.loadtxt(lines, delimiter=",", usecols=wanted, ndmin=2),
+            lambda: np.loadtxt(
+                lines, delimiter=",", usecols=wanted, ndmin=2, max_rows=self.num_frames + 1
+            ),
         )
         return dict(zip(AU_COLUMNS, table.T, strict=True))
 

@@ -1,15 +1,17 @@
 """Reads arrays of numbers from files that may be anybody's."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.common.files import check_regular
 from ico3d.common.unpacking.npy import DAMAGED, array_head
+from ico3d.common.unpacking.npz import WIDTH
 from ico3d.errors import CaptureError
 
 LARGEST = 1 << 28
-"""Bytes of an array: eleven million points."""
+"""Bytes of an array as numbers of 64 bits: eleven million points."""
 
 
 def read_numbers(file: Path) -> np.ndarray:
@@ -26,12 +28,12 @@ def read_numbers(file: Path) -> np.ndarray:
             begin = opened.tell()
         if kind.kind not in "fiu":
             raise ValueError("no numbers")
+        if math.prod(shape) * max(kind.itemsize, WIDTH) > LARGEST:  # zeros take no room on a disk
+            raise CaptureError(f"{file} holds more than {LARGEST >> 20} MiB of numbers: too many.")
         # Mapped, an array cannot claim more memory than the file has.
         mapped = np.memmap(file, kind, "r", begin, shape, "F" if fortran else "C")
     except (OSError, *DAMAGED) as error:
         raise CaptureError(
             f"{file} is damaged and cannot be read: it is no array of numbers."
         ) from error
-    if mapped.nbytes > LARGEST:  # a file of zeros takes no room on a disk
-        raise CaptureError(f"{file} holds more than {LARGEST >> 20} MiB of numbers: too many.")
     return np.array(mapped)

@@ -1,11 +1,13 @@
 """Reads PyTorch's files of weights (.pth, .pt, .bin), in which torch unpacks what is packed."""
 
-import pickletools
+import pickle
 import re
+import tarfile
 import zipfile
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ico3d.common.unpacking.pickles import check_pickles
 from ico3d.common.unpacking.zips import check_directory
 from ico3d.errors import ModelError
 
@@ -13,16 +15,15 @@ NEEDED = re.compile(
     r"collections OrderedDict|torch (\w+Storage|[a-z]+\d+\w*|half|float|double|bool|long|Size)"
     r"|torch device"
     r"|torch\.storage \w+Storage|torch\.nn\.parameter Parameter"
-    r"|torch\._utils _rebuild_(tensor|tensor_v2|parameter|parameter_with_state)"
+    r"|torch\._utils _rebuild_(tensor|tensor_v2|parameter)"
 )
 """Names that files of weights give: kinds of numbers, and what makes tensors of those in the file.
 Of others some make as many bytes as they are told."""
-MOST_STEPS = 500_000
-"""Steps of a pickle: each may make an object of 200 bytes. Models of thousands of tensors have some
-ten thousand."""
 OLD_PICKLES = 5
 """Pickles at the beginning of a file of PyTorch before 1.6: a mark, a version, what wrote it, the
 objects, and the keys of the numbers behind."""
+OLD = pickle.dumps(0x1950A86A20F9469CFC6C, 2)
+"""How such a file begins."""
 ZIP = b"PK\3\4"
 """How a file begins that torch takes for an archive; it has no packed parts in other ones."""
 
@@ -40,7 +41,7 @@ def check_unpacked(path: Path) -> None:
                 _check_archive(path, file)
             else:
                 file.seek(0)
-                _check_steps(path, file, OLD_PICKLES)
+                _check_old(path, file)
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
             raise ModelError(f"{path} is a damaged file of weights: {error}") from error
 
@@ -60,24 +61,21 @@ def _check_archive(path: Path, file: BinaryIO) -> None:
         for entry, name in zip(entries, names, strict=True):
             if name.endswith(".pkl"):
                 with archive.open(entry) as pickled:
-                    _check_steps(path, pickled, 1)
+                    check_pickles(pickled, 1, NEEDED, str(path))
 
 
-def _check_steps(path: Path, file: Any, pickles: int) -> None:
-    """Reads some pickles one after the other, without making anything of them."""
-    left = MOST_STEPS
-    for _ in range(pickles):
-        for step, argument, _ in pickletools.genops(file):
-            left -= 1
-            if left < 0:
-                raise ModelError(
-                    f"{path} holds more objects than a file of weights: it is not read."
-                )
-            if "GLOBAL" in step.name and not NEEDED.fullmatch(str(argument)):
-                what = str(argument)[:80]
-                raise ModelError(
-                    f"{path} names {what!r}, as no file of weights does: it is not read."
-                )
+def _check_old(path: Path, file: BinaryIO) -> None:
+    """A file of PyTorch before 1.6; torch first tries whether it is one of before 0.1, a tar."""
+    head = file.read(tarfile.BLOCKSIZE)
+    if not head.startswith(OLD):
+        raise ValueError("it does not begin as PyTorch begins one")
+    try:
+        tarfile.TarInfo.frombuf(head, tarfile.ENCODING, "surrogateescape")
+    except tarfile.HeaderError:
+        file.seek(0)
+        check_pickles(file, OLD_PICKLES, NEEDED, str(path))
+    else:
+        raise ModelError(f"{path} passes for two kinds of files: it is not read.")
 
 
 def load_weights(path: Path, device: Any = "cpu") -> Any:

@@ -115,8 +115,8 @@ class EncoderTraining:
 
     def _resume(self) -> None:
         """Takes over the checkpoint."""
-        state = load_weights(self._checkpoint, None)
         try:
+            state = load_weights(self._checkpoint, None)
             if state["settings"] != asdict(self.settings):
                 raise SettingsError(
                     f"{self._checkpoint.parent} holds a training with other settings: "
@@ -126,7 +126,9 @@ class EncoderTraining:
             self.readout.load_state_dict(state["readout"])
             self._optimiser.load_state_dict(state["optimiser"])
             self.step = int(state["step"])
-        except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
+        except (ModelError, SettingsError):
+            raise
+        except Exception as error:  # torch raises errors of many kinds for damaged files
             raise ModelError(f"{self._checkpoint} holds no training of an encoder.") from error
 
     def finished(self) -> tuple[BuiltinEncoder, Readout]:

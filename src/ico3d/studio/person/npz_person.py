@@ -45,6 +45,10 @@ LARGEST = 1 << 28
 """Bytes of all arrays as numbers of 64 bits; 53 blendshapes of 27,000 vertices would take 34 MB."""
 MOST_VERTICES = 1 << 19
 """Vertices that are read; the files have 44,000."""
+MOST_MOVED = 1 << 25
+"""Edges that shapes move, one after the other: the files have half as many."""
+MOST_INFLUENCES = 16
+"""Joints on which a vertex may hang."""
 BUST_DEPTH = 0.55
 """Distance below the eyes at which a bust ends, metres; no camera of the head rig sees lower."""
 
@@ -129,6 +133,8 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
 def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
     """Refuses what would fill the memory: each shape and joint gets a row of all vertices.
 
+    Where triangles are split, it gets one of all edges as well.
+
     Raises:
         ValueError: If there are too many.
     """
@@ -137,6 +143,12 @@ def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
         raise ValueError(
             f"{shapes} shapes and {joints} joints of {vertices} vertices are more than is taken"
         )
+    edges = 3 * len(arrays["faces"])  # of triangles that share none
+    if edges * max(shapes, joints) > MOST_MOVED:
+        raise ValueError(f"{shapes} shapes of {edges // 3} triangles are more than is taken")
+    shape = arrays["w_idx"].shape
+    if len(shape) != 2 or shape != arrays["w_val"].shape or shape[1] > MOST_INFLUENCES:
+        raise ValueError(f"its vertices hang on more than {MOST_INFLUENCES} joints each")
 
 
 def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:

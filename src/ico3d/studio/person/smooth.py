@@ -68,7 +68,8 @@ def _split_deltas(subject: Subject, edges: np.ndarray) -> tuple[np.ndarray, np.n
     index = len(subject.vertices) + np.flatnonzero(moved)
     shape_count = len(subject.deltas)
     padded = np.concatenate([subject.deltas, np.zeros((shape_count, 1, 3), np.float32)], axis=1)
-    middles = padded[:, ends[moved]].mean(axis=2)  # (K, N, 3); row -1 is the zero at the end
+    first, second = ends[moved].T  # (N,) each; row -1 is the zero at the end
+    middles = np.stack([0.5 * (shape[first] + shape[second]) for shape in padded])  # (K, N, 3)
     return (
         np.concatenate([subject.delta_vertices, index]).astype(np.int32),
         np.concatenate([subject.deltas, middles], axis=1).astype(np.float32),
