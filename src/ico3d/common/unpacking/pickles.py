@@ -24,8 +24,23 @@ MOST_MEMBERS = 64
 """Axes of a tensor, and remarks of a dictionary."""
 
 _KINDS = frozenset(
-    "GLOBAL NONE NEWFALSE NEWTRUE EMPTY_TUPLE EMPTY_LIST EMPTY_DICT EMPTY_SET BININT BININT1 "
-    "BININT2 BINFLOAT BINUNICODE SHORT_BINSTRING LONG1".split()
+    [
+        "GLOBAL",
+        "NONE",
+        "NEWFALSE",
+        "NEWTRUE",
+        "EMPTY_TUPLE",
+        "EMPTY_LIST",
+        "EMPTY_DICT",
+        "EMPTY_SET",
+        "BININT",
+        "BININT1",
+        "BININT2",
+        "BINFLOAT",
+        "BINUNICODE",
+        "SHORT_BINSTRING",
+        "LONG1",
+    ]
 )
 """Steps that put something upon the stack and take nothing from it."""
 _TUPLES = {"TUPLE1": 1, "TUPLE2": 2, "TUPLE3": 3}
