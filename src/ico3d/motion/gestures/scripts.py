@@ -57,8 +57,8 @@ def _script(
 _ELBOW = (0.5, -0.82, -0.3)
 
 _WAVE = Reach((0.05, 0.05, 0.42), (0.42, -0.9, -0.15), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
-_WAVE_IN = replace(_WAVE, place=(0.03, 0.04, 0.42), fingers=(-0.36, 1.0, 0.06))
-_WAVE_OUT = replace(_WAVE, place=(0.07, 0.04, 0.42), fingers=(0.4, 1.0, 0.06))
+_WAVE_IN = replace(_WAVE, place=(0.03, 0.04, 0.42), fingers=(-0.38, 1.0, 0.06))
+_WAVE_OUT = replace(_WAVE, place=(0.08, 0.04, 0.42), fingers=(0.42, 1.0, 0.06))
 
 _AIM = Reach((0.14, -0.34, 0.40), (0.55, -0.82, -0.3), (-0.1, 0.25, 1.0), (-0.8, -0.6, 0.1))
 _POINT = Reach((-0.03, -0.10, 0.83), _ELBOW, (-0.06, 0.06, 1.0), (-0.55, -0.83, 0.0), "point")
@@ -105,7 +105,7 @@ _BEFORE_SMALL = replace(_SMALL, place=(0.22, -0.26, 0.50), shape="loose")
 
 def _wave() -> Script:
     up, half, down = 0.7, 0.24, 0.8
-    swings = (_WAVE_IN, _WAVE_OUT, _WAVE_IN, _WAVE_OUT)
+    swings = (_WAVE_OUT, _WAVE_IN, _WAVE_OUT, _WAVE_IN)
     right: list[Key] = [(0.0, HANG)]
     right += [(up + half * i, swing) for i, swing in enumerate(swings)]
     last = up + half * (len(swings) - 1)
