@@ -167,6 +167,15 @@ def test_a_long_speech_visits_every_action_the_best_ones_most():
     assert len(stops) / 40 >= 4  # it does not stand about
 
 
+def test_the_longest_way_has_an_end_soon():
+    """A way without an end kept a server busy for ever, at the first sentence."""
+    points = leg(7200.0, 0.05, False)
+    assert len(points) < 10_020
+    (a, b), (c, d) = points[100], points[9000]
+    assert (d - b) / (c - a) == pytest.approx(0.05)
+    assert points[-1] == pytest.approx((travel(7200.0, 0.05, 2), 7200.0))
+
+
 def test_seeds_differ():
     one, two = (plan(TALK, Start(0.4), 9.0, np.random.default_rng(seed)) for seed in (1, 2))
     assert one != two

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
+from ico3d.capture import synthetic
 from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError
 from support.recordings.synthetic_folder import write_synthetic
@@ -101,3 +102,8 @@ def test_frames_are_of_the_types_that_recordings_have(folder, name, value, words
     file = folder / "frames.safetensors"
     save_file(load_file(file) | {name: value}, file)
     fails(lambda: open_capture(folder), *words)
+
+
+def test_points_are_not_millions(folder, monkeypatch):
+    monkeypatch.setattr(synthetic, "MOST_POINTS", 8)
+    fails(lambda: open_capture(folder), "more than 8 points")

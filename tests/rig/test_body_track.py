@@ -145,6 +145,13 @@ def test_what_is_no_such_file_is_refused(tmp_path):
             read_body_track(tmp_path, 5, 15.0)
 
 
+def test_a_surface_of_millions_is_not_moved(track, tmp_path, monkeypatch):
+    write_body_track(track, tmp_path)
+    monkeypatch.setattr(body_track, "MOST_VERTICES", len(track.vertices) - 1)
+    with pytest.raises(CaptureError, match="more than 3 vertices"):
+        read_body_track(tmp_path, 5, 15.0)
+
+
 def test_a_file_that_claims_much_is_not_read(tmp_path):
     write_claim(tmp_path / NAME, "rotations", 1 << 29)
     with pytest.raises(CaptureError, match="it has more than 256 MiB"):

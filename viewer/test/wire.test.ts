@@ -87,6 +87,8 @@ test('a frame of speech must hold what its sizes say', () => {
   expect((decode(speechFrame([2], [1, 3])) as SpeechMessage).expressions).toMatchObject({ rows: 1, columns: 3 });
   expect((decode(speechFrame([5], [70, 0])) as SpeechMessage).expressions).toMatchObject({ rows: 0, columns: 0 });
   expect((decode(speechFrame([5], [65_536, 0])) as SpeechMessage).expressions).toMatchObject({ rows: 0, columns: 0 });
+  const header = { type: 'speech', utterance: 1, index: 0, first_sample: 0, first_expression: 0, pcm: [0], expressions: [65, 1] };
+  expect(() => decode(binaryFrame(header, 130))).toThrow(/65 moments/); // a view of each would be kept, 50 times as large
   const odd: [unknown, unknown, number?][] = [
     [[2], [200_000_000, 53]],
     [[5], [200_000_000, 0]],
@@ -113,19 +115,20 @@ test('a message that is longer than any may be is not even parsed', () => {
   expect(() => decode(`{"type": "state", "state": "${'a'.repeat(MAX_TEXT_FRAME)}"}`)).toThrow(/more than 16384 bytes/);
 });
 
+function binaryFrame(header: object, body = 0): ArrayBuffer {
+  const text = new TextEncoder().encode(JSON.stringify(header));
+  const frame = new Uint8Array(4 + text.length + body);
+  new DataView(frame.buffer).setUint32(0, text.length, true);
+  frame.set(text, 4);
+  return frame.buffer;
+}
+
 test('each message travels in its kind of frame, and a head is no longer than a text', () => {
-  const binary = (header: object, body = 0) => {
-    const text = new TextEncoder().encode(JSON.stringify(header));
-    const frame = new Uint8Array(4 + text.length + body);
-    new DataView(frame.buffer).setUint32(0, text.length, true);
-    frame.set(text, 4);
-    return frame.buffer;
-  };
-  expect(() => decode(binary({ type: 'answer', utterance: 5, first_sample: 0, text: 'a' }))).toThrow(/answer is no message of a binary frame/);
+  expect(() => decode(binaryFrame({ type: 'answer', utterance: 5, first_sample: 0, text: 'a' }))).toThrow(/answer is no message of a binary frame/);
   expect(() => decode('{"type": "speech", "pcm": [0], "expressions": [0, 0]}')).toThrow(/speech is no message of a text frame/);
   const speech = { type: 'speech', utterance: 1, index: 0, first_sample: 0, first_expression: 0, pcm: [0], expressions: [0, 0] };
-  expect(decode(binary(speech))).toMatchObject({ type: 'speech' });
-  expect(() => decode(binary({ ...speech, more: 'a'.repeat(MAX_TEXT_FRAME) }))).toThrow(/more than 16384 bytes/);
+  expect(decode(binaryFrame(speech))).toMatchObject({ type: 'speech' });
+  expect(() => decode(binaryFrame({ ...speech, more: 'a'.repeat(MAX_TEXT_FRAME) }))).toThrow(/more than 16384 bytes/);
 });
 
 test('many half floats are the same as each alone', () => {

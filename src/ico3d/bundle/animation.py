@@ -9,6 +9,7 @@ import json
 from dataclasses import dataclass
 from typing import Any, cast
 
+from ico3d.bundle import limits
 from ico3d.bundle.manifest import BodyInfo
 from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.common.typed import Rules, fill, parse_json, plain
@@ -19,8 +20,8 @@ VERSION = 1
 MAX_BYTES = 1 << 20
 MAX_FRAMES = 1_000_000
 MAX_ACTIONS = 1000
-FASTEST = 4.0
-"""Highest value of `max_speed`, captured seconds per second."""
+SLOWEST, FASTEST = 0.05, 4.0
+"""Lowest value of `min_speed` and highest of `max_speed`, captured seconds per second."""
 
 MOST_NAMED = 8
 """Number of actions that have names and can be asked for."""
@@ -85,8 +86,11 @@ class Animation:
         """
         last = self.num_frames - 1
         _require(self.version == VERSION, "version", f"be {VERSION}")
-        _require(0 < self.fps <= 1000, "fps", "lie between 0 and 1000")
+        inside = limits.MIN_FPS <= self.fps <= limits.MAX_FPS
+        _require(inside, "fps", limits.FPS_RANGE)
         _require(2 <= last + 1 <= MAX_FRAMES, "num_frames", f"lie between 2 and {MAX_FRAMES}")
+        short = last <= limits.LONGEST * self.fps
+        _require(short, "num_frames", f"last {limits.LONGEST:g} s at most")
         _require(0 <= self.rest.start < last, "rest.start", f"lie between 0 and {last - 1}")
         inside = self.rest.start < self.rest.end <= last
         _require(inside, "rest.end", f"lie between {self.rest.start + 1} and {last}")
@@ -98,7 +102,8 @@ class Animation:
             _require(action.frame not in seen, f"{where}.frame", "be there only once")
             seen.add(action.frame)
             _require(0 <= action.score <= 1, f"{where}.score", "lie between 0 and 1")
-        _require(0 < self.min_speed <= FASTEST, "min_speed", f"lie between 0 and {FASTEST:g}")
+        inside = SLOWEST <= self.min_speed <= FASTEST
+        _require(inside, "min_speed", f"lie between {SLOWEST:g} and {FASTEST:g}")
         inside = self.min_speed <= self.max_speed <= FASTEST
         _require(inside, "max_speed", f"lie between min_speed and {FASTEST:g}")
         known = len(self.quality) in (0, self.num_frames)

@@ -8,6 +8,11 @@ MAX_ASIDE_BYTES = 4 << 20
 """Bytes of a file that is no part of the person's figure: licences, the thumbnail."""
 MAX_BUNDLE_BYTES = 512 << 20
 MAX_MANIFEST_BYTES = 1 << 20
+MIN_FPS, MAX_FPS = 0.1, 1000.0
+"""Recorded frames per second: what is planned in seconds has no end where a frame has none."""
+FPS_RANGE = f"lie between {MIN_FPS:g} and {MAX_FPS:g}"
+LONGEST = 7200.0
+"""Seconds of a recorded motion."""
 MAX_GAUSSIANS = 1_000_000
 MAX_RANK = 64
 MAX_HIDDEN = 1024

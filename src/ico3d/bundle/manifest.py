@@ -302,7 +302,7 @@ def _check_head(head: HeadInfo) -> None:
     inside = 0 <= head.num_rest < head.num_gaussians
     _require(inside, "head.num_rest", "be less than head.num_gaussians")
     _require(head.inputs in ("speech", "blendshapes"), "head.inputs", "be speech or blendshapes")
-    _require(0 < head.fps <= 1000, "head.fps", "lie between 0 and 1000")
+    _require(limits.MIN_FPS <= head.fps <= limits.MAX_FPS, "head.fps", limits.FPS_RANGE)
     size = head.expression_size
     _require(len(head.idle_expression) == size, "head.idle_expression", f"have {size} values")
     named = len(head.expression_names)
@@ -313,7 +313,7 @@ def _check_head(head: HeadInfo) -> None:
 
 
 def _check_body(body: BodyInfo) -> None:
-    _require(0 < body.fps <= 1000, "body.fps", "lie between 0 and 1000")
+    _require(limits.MIN_FPS <= body.fps <= limits.MAX_FPS, "body.fps", limits.FPS_RANGE)
     top = limits.MAX_SAMPLES_PER_FRAME
     inside = 1 <= body.samples_per_frame <= top
     _require(inside, "body.samples_per_frame", f"lie between 1 and {top}")
@@ -354,7 +354,7 @@ def _check_speech(manifest: Manifest) -> None:
     _require(driven == (speech is not None), "speech", "be there just for heads driven by speech")
     if speech is not None:
         _require(speech.input in ("mel", "features"), "speech.input", "be mel or features")
-        _require(0 < speech.fps <= 1000, "speech.fps", "lie between 0 and 1000")
+        _require(limits.MIN_FPS <= speech.fps <= limits.MAX_FPS, "speech.fps", limits.FPS_RANGE)
         _require(head is None or head.eye_offset == 32, "head.eye_offset", "be 32 for speech")
 
 

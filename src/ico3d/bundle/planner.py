@@ -20,6 +20,8 @@ EASE = 0.2
 """Seconds in which motion accelerates from standing still, or slows down to it."""
 RAMP = 4
 """Number of straight pieces that approximate one such acceleration."""
+MOST_POINTS = 10_000
+"""Points of the steady part of a motion, in which the speed is the same all the time."""
 STEP = 0.25
 """Seconds between points of steady motion; small, so that a path can be sent piece by piece."""
 SHORTEST = 0.25
@@ -305,7 +307,7 @@ def leg(way: float, speed: float, moving: bool) -> list[Point]:
     at, place = points[-1] if points else (0.0, 0.0)
     end = travel(way, speed, 1 if moving else 2)
     steady = end - ease - at
-    count = math.ceil(steady / STEP) if steady > 1e-9 else 0
+    count = min(math.ceil(steady / STEP), MOST_POINTS) if steady > 1e-9 else 0
     for i in range(1, count + 1):
         points.append((at + steady * i / count, place + speed * steady * i / count))
     ending = [(end - seconds, way - part) for seconds, part in [(0.0, 0.0), *ramp[:-1]]]

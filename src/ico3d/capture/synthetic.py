@@ -20,6 +20,8 @@ from ico3d.errors import CaptureError
 FORMAT, VERSION = "ico3d-synthetic", 2
 READABLE = (1, 2)
 """Versions that can be read; version 1 has no field for what is shown and is always a head."""
+MOST_POINTS = 1_000_000
+"""Points of the surface in a frame; recordings have 6,000."""
 LARGEST = 1 << 29
 """Bytes of the file of frames: an hour of a body's points takes as much."""
 NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
@@ -180,6 +182,8 @@ class SyntheticCapture(RecordedCapture):
         }
         for name, shape in expected.items():
             _check_array(file, name, arrays.get(name), shape)
+        if arrays["points"].shape[-2] > MOST_POINTS:
+            raise CaptureError(f"{file}: more than {MOST_POINTS} points: record again.")
         return arrays
 
 

@@ -34,6 +34,8 @@ NUMBERS = {
     "vertex_weights": np.float32,
 }
 """Types of the arrays: of narrower ones, what is computed would be many times as large."""
+MOST_VERTICES, MOST_FACES = 1 << 20, 1 << 21
+"""Of a surface; each vertex takes 200 bytes more while it is moved."""
 _DAMAGE = (ValueError, KeyError, TypeError, OverflowError, AttributeError)
 """What damaged files raise; AttributeError for kinds of numbers that numpy has not."""
 LONGEST = 1e3
@@ -199,6 +201,8 @@ def _read(file: Path) -> BodyTrack:
         raise ValueError(f"its version is {about.get('version')}, not {VERSION}")
     rig = Rig(tuple(map(str, about["names"])), tuple(map(int, about["parents"])), arrays["joints"])
     frames, vertices = len(arrays["rotations"]), len(arrays["vertices"])
+    if vertices > MOST_VERTICES or len(arrays["faces"]) > MOST_FACES:
+        raise ValueError(f"its surface has more than {MOST_VERTICES} vertices")
     shapes = {
         "joints": (len(rig), 3),
         "rotations": (frames, len(rig), 4),

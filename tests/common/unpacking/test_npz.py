@@ -97,11 +97,16 @@ def test_a_subject_of_many_shapes_or_joints_is_refused(tmp_path, vertices, shape
 def test_a_subject_of_many_triangles_or_influences_is_refused(tmp_path):
     """Each edge would get a row of numbers for all shapes, each influence one of a joint."""
     names = {"bs_names": np.zeros(300, "U1"), "joint_names": np.zeros(2, "U1")}
+    names |= {"vis_names": np.zeros(15, "U1"), "part_names": np.array(["shirt", "skin"])}
+    names["face_part"] = np.zeros(60_000, "u1")
     arrays = names | {"verts": np.zeros((500, 3), "u1"), "w_idx": np.zeros((500, 4), "u1")}
     arrays |= {"faces": np.zeros((60_000, 3), "u2"), "w_val": np.zeros((500, 4), "f2")}
-    with pytest.raises(CaptureError, match="300 shapes of 60000 triangles are more than is taken"):
+    with pytest.raises(CaptureError, match="300 shapes of 300000 triangles are more than is taken"):
         load_npz(write(tmp_path / "a.npz", **arrays))
-    arrays["faces"] = arrays["faces"][:10]
+    arrays |= {name: arrays[name][:10] for name in ("faces", "face_part")}
+    spoken = arrays | {"vis_names": np.zeros(1001, "U1")}
+    with pytest.raises(CaptureError, match="more than 1000 shapes, joints or visemes"):
+        load_npz(write(tmp_path / "d.npz", **spoken))
     wide = arrays | {name: np.zeros((500, 17), "u1") for name in ("w_idx", "w_val")}
     with pytest.raises(CaptureError, match="more than 16 joints each"):
         load_npz(write(tmp_path / "b.npz", **wide))

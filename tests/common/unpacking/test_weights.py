@@ -3,6 +3,7 @@
 import pickle
 import tarfile
 import zipfile
+from collections import OrderedDict
 
 import pytest
 import torch
@@ -130,6 +131,8 @@ def test_nothing_is_made_of_a_number_alone(tmp_path, module, how):
 
 
 ORDERED, SIZE = b"ccollections\nOrderedDict\n", b"ctorch\nSize\n"
+NUMBERS, KEY = b"ctorch\nFloatStorage\n", b"X\1\0\0\x000X\3\0\0\0cpu"
+STORED = b"X\7\0\0\0storage" + NUMBERS + KEY
 MANY = b"](" + b"".join(b"K" + bytes([i]) + b"N\x86" for i in range(100)) + b"e"
 
 
@@ -144,6 +147,8 @@ MANY = b"](" + b"".join(b"K" + bytes([i]) + b"N\x86" for i in range(100)) + b"e"
         (b"ctorch.nn.parameter\nParameter\n)\x81", "NEWOBJ"),
         (b"}))" + b"q\1h\1\x86" * 30 + b"Ns", "a key is a tuple"),
         (b"R", "do not fit"),
+        (b"K\0Q", "no kind that weights have"),
+        (b"(" + STORED + b"J\xff\xff\xff\x7ftQ", "more numbers"),
         (b"K\1K\1a", "do not fit"),
     ],
 )
@@ -176,6 +181,44 @@ def test_trainings_are_read(tmp_path, old):
     assert read["network"]._metadata == network.state_dict()._metadata
     assert read["settings"] == state["settings"] and read["size"] == (3, 4)
     optimiser.load_state_dict(read["optimiser"])
+
+
+@pytest.mark.parametrize(
+    ("storage", "offset", "size", "stride"),
+    [
+        (16, 0, (17,), (1,)),
+        (16, 0, (10**9,), (0,)),
+        (16, 1, (4, 4), (4, 1)),
+        (16, -1, (1,), (1,)),
+        (16, 0, (1,) * 65, (1,) * 65),
+        (16, 0, (4,), (4, 1)),
+        (16, 0, (2, 2), (1, "1")),
+    ],
+)
+def test_a_tensor_is_no_larger_than_its_numbers(tmp_path, storage, offset, size, stride):
+    """196 bytes had torch make room for 3 GB of them."""
+
+    class Told:
+        def __reduce__(self):
+            numbers = torch.arange(storage, dtype=torch.float32)._typed_storage()
+            more = (False, OrderedDict())
+            return torch._utils._rebuild_tensor_v2, (numbers, offset, size, stride, *more)
+
+    file = tmp_path / "a.pt"
+    torch.save({"x": Told()}, file)
+    with pytest.raises(ModelError, match=r"tensor|axes"):
+        load_weights(file)
+
+
+def test_numbers_that_are_named_anew_count_anew(tmp_path):
+    """Names that differ in their case were read again and again: 4 MB took 2.5 GB."""
+    once = b"(X\7\0\0\0storage" + NUMBERS
+    many = b"".join(
+        once + b"X\4\0\0\0" + name + b"X\3\0\0\0cpuM\0\2tQ" for name in (b"abcd", b"Abcd", b"aBcd")
+    )
+    file = archive_of(tmp_path / "a.pt", b"\x80\x02](" + many + b"e.")
+    with pytest.raises(ModelError, match="names more numbers than it has"):
+        load_weights(file)
 
 
 def hole(path, head, size):

@@ -13,6 +13,7 @@ export class Player {
   onFinish: (utterance: number, seconds: number) => void = () => {};
   private voices: Voice[] = []; // in the order in which they speak
   private lastDropped = -1;
+  private readonly buffers = new WeakMap<Int16Array, AudioBuffer>(); // of pieces: who is interrupted goes on with the same ones
 
   constructor() {
     // At the speech's own rate no piece is resampled on its own: pieces join exactly.
@@ -109,8 +110,8 @@ export class Player {
     return {
       now: () => Math.ceil((context.currentTime + GUARD) * SPEECH_RATE),
       play: (pcm, start) => {
-        const buffer = new AudioBuffer({ length: pcm.length, sampleRate: SPEECH_RATE, numberOfChannels: 1 });
-        buffer.copyToChannel(Float32Array.from(pcm, (value) => value / 0x8000), 0);
+        let buffer = this.buffers.get(pcm);
+        if (!buffer) this.buffers.set(pcm, (buffer = bufferOf(pcm)));
         const source = new AudioBufferSourceNode(context, { buffer });
         source.connect(node);
         source.start(start / SPEECH_RATE);
@@ -130,4 +131,12 @@ export class Player {
     this.voices.shift();
     this.onFinish(voice.utterance, voice.samples / SPEECH_RATE);
   }
+}
+
+function bufferOf(pcm: Int16Array): AudioBuffer {
+  const buffer = new AudioBuffer({ length: pcm.length, sampleRate: SPEECH_RATE, numberOfChannels: 1 });
+  const values = new Float32Array(pcm.length);
+  for (let i = 0; i < pcm.length; i++) values[i] = pcm[i]! / 0x8000;
+  buffer.copyToChannel(values, 0);
+  return buffer;
 }

@@ -75,7 +75,7 @@ export class Voice {
     this.waiting = [];
     const starts = waiting.map(({ first, pcm }) => {
       const skip = Math.max(0, held - first);
-      return this.place(first + skip, pcm.subarray(skip), 0);
+      return this.place(first + skip, skip > 0 ? pcm.subarray(skip) : pcm, 0);
     });
     this.sink.fade(0, 1, starts[0] ?? this.sink.now());
   }

@@ -188,14 +188,15 @@ function checkHead(head: HeadInfo): void {
     if (!isCount(head[key], MOST[key])) bad(`head.${key}`);
   }
   if (!isCount(head.num_gaussians, MAX_GAUSSIANS)) bad('head.num_gaussians'); // room is made for all before the last ones come
-  if (!isPositive(head.fps)) bad('head.fps');
+  if (!isRate(head.fps)) bad('head.fps');
   if (!isRest(head.num_rest, head.num_gaussians)) bad('head.num_rest');
   if (head.num_displacements !== 0 && !isCount(head.num_displacements, MOST.displacements)) bad('head.num_displacements');
   if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
 }
 
 function checkBody(body: BodyInfo): void {
-  for (const key of ['fps', 'samples_per_frame'] as const) if (!isPositive(body[key])) bad(`body.${key}`);
+  if (!isRate(body.fps)) bad('body.fps');
+  if (!isPositive(body.samples_per_frame)) bad('body.samples_per_frame');
   for (const key of ['low', 'high'] as const) if (!isNumbers(body[key], 3)) bad(`body.${key}`);
   if (!Array.isArray(body.windows) || body.windows.length === 0) bad('body.windows');
   body.windows.forEach((window, i) => {
@@ -222,7 +223,7 @@ function checkTogether(head: HeadInfo, fps: number, frames: number): void {
 }
 
 function checkSkinned(info: SkinnedInfo): void {
-  if (!isPositive(info.fps)) bad('skinned.fps');
+  if (!isRate(info.fps)) bad('skinned.fps');
   for (const key of ['low', 'high'] as const) if (!isNumbers(info[key], 3)) bad(`skinned.${key}`);
   const { names, parents } = info;
   if (!Array.isArray(names) || !isCount(names.length, MAX_JOINTS)) bad('skinned.names');
@@ -261,6 +262,11 @@ export function nameOf({ persona, name }: Manifest): string {
 
 function isCount(value: unknown, most: number): boolean {
   return Number.isInteger(value) && (value as number) > 0 && (value as number) <= most;
+}
+
+/** Whether it is a number of recorded frames per second. */
+function isRate(value: unknown): boolean {
+  return isPositive(value) && (value as number) >= 0.1 && (value as number) <= 1000;
 }
 
 function isPositive(value: unknown): boolean {

@@ -96,7 +96,7 @@ export class Captioning {
     this.sentences = this.sentences.filter(({ utterance }) => utterance > last);
     for (const key of [...this.times.keys()]) if (Number(key.split(' ')[0]) <= last) this.times.delete(key);
     for (const utterance of over) this.events.over(utterance, interrupted);
-    this.shown = null;
+    if (this.shown && this.shown.utterance <= last) this.shown = null;
     if (this.sentences.length > 0) return;
     clearInterval(this.timer);
     this.timer = undefined;

@@ -25,8 +25,8 @@ const SILENT = 4000; // close code: another line speaks
 /** Bytes of text, and of sound with its faces, that a server may send at once, and for long per second: an answer has 15 MB. */
 const TEXT = [1 << 20, 1 << 15] as const;
 const SOUND = [1 << 25, 1 << 18] as const;
-/** Frames likewise: an answer of five minutes has 3,100 pieces, and each frame costs the page time, whatever it holds. */
-const FRAMES = [4096, 256] as const;
+/** Frames likewise, each of which costs the page time, whatever it holds: a server speaks two seconds ahead, in ten pieces each. */
+const FRAMES = [1024, 128] as const;
 const LONGEST_HANDSHAKE = 8000; // ms, of a line that is to go on with a session
 
 /** The session is over. */

@@ -23,6 +23,8 @@ const CUT = ' …';
 const ENDED = /[.!?。！？…]["'”’»)]*\s*$/; // answers come clause by clause
 const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]/; // of scripts that put no spaces between sentences
 const MOST_ENTRIES = 1000;
+/** Entries of talks before this one. */
+const MOST_EARLIER = 200;
 /** Letters of an answer that are kept, and clauses of a sentence that goes on: servers say 4,000 at most. */
 const MOST_LETTERS = 20_000;
 const MOST_BEFORE = 4000;
@@ -46,7 +48,7 @@ export class TalkRecord {
   /** What stays for this visitor when another talk begins: talks in which they said something. */
   get lasting(): readonly Entry[] {
     if (this.closed) return [];
-    return this.entries.some(({ who }) => who === 'you') ? [...this.earlier, ...this.entries] : this.earlier;
+    return this.entries.some(({ who }) => who === 'you') ? [...this.earlier, ...this.entries].slice(-MOST_EARLIER) : this.earlier;
   }
 
   /** The visitor has asked; after a lost connection the server may repeat the last question. */
@@ -64,8 +66,10 @@ export class TalkRecord {
       this.answer = { utterance: progress.utterance, entry, sentences: new Map(), letters: 0 };
     }
     const { entry, sentences } = this.answer;
-    if (!sentences.has(progress.first)) this.answer.letters += progress.text.length;
-    if (this.answer.letters > MOST_LETTERS) return;
+    const before = sentences.get(progress.first)?.text.length ?? -1; // also a sentence of nothing takes room
+    const letters = this.answer.letters + progress.text.length - before;
+    if (letters > MOST_LETTERS) return;
+    this.answer.letters = letters;
     sentences.set(progress.first, progress);
     entry.text = joined([...sentences.values()].map(({ text, heard }) => text.slice(0, heard).trim()));
     if (!entry.text) return;
@@ -152,5 +156,6 @@ export class RunningSentence {
 }
 
 function joined(sentences: readonly string[]): string {
-  return sentences.filter(Boolean).reduce((text, sentence) => (!text || JOINED.test(text.at(-1)!) ? text + sentence : `${text} ${sentence}`), '');
+  const said = sentences.filter(Boolean);
+  return said.map((sentence, i) => (i === 0 || JOINED.test(said[i - 1]!.at(-1)!) ? sentence : ` ${sentence}`)).join('');
 }

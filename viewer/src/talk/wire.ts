@@ -77,8 +77,12 @@ function checked(header: Header, binary: boolean): ServerMessage {
   return header as unknown as ServerMessage;
 }
 
+/** More than a frame has room for the sound of. */
+const MOST_ROWS = 64;
+
 /** Rows that hold nothing are none: nobody sent them, and each would take up memory. */
 function matrix(shape: number[], words: Uint16Array): Matrix {
   const [rows = 0, columns = 0] = shape;
+  if (columns && rows > MOST_ROWS) throw new Error(`expressions of ${rows} moments are more than a piece has`);
   return { rows: columns && rows, columns, values: floatsFromHalves(words) };
 }

@@ -111,6 +111,16 @@ describe('a record', () => {
     expect(record.entries).toHaveLength(1);
   });
 
+  test('is told once, whatever is stopped that nobody says', () => {
+    const { play, answer, captions, told } = listen();
+    for (let i = 0; i < 9; i++) answer(0, i, `${i}.`);
+    play(0, 8.9);
+    const before = told.length;
+    for (let i = 0; i < 50; i++) captions.stop(-1);
+    play(0, 9);
+    expect(told.length - before).toBeLessThan(2);
+  });
+
   test('stays through a lost connection, after which the server repeats the question, and goes with the session', () => {
     const { record, said, changes } = listen();
     record.begin(false);

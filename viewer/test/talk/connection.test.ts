@@ -301,7 +301,7 @@ test('what a server sends beyond all measure is not heard', () => {
   connection.close();
 });
 
-test('of frames without number, however small, 4,096 are heard at once, and 256 a second', () => {
+test('of frames without number, however small, 1,024 are heard at once, and 128 a second', () => {
   const heard: unknown[] = [];
   const { connection } = connect((message) => heard.push(message));
   ScriptedSocket.last.beats = false;
@@ -311,9 +311,9 @@ test('of frames without number, however small, 4,096 are heard at once, and 256 
     for (let i = 0; i < 5000; i++) ScriptedSocket.last.onmessage?.({ data: text } as MessageEvent<string>);
   };
   flood();
-  expect(heard).toHaveLength(4095);
+  expect(heard).toHaveLength(1023);
   vi.advanceTimersByTime(1000);
   flood();
-  expect(heard).toHaveLength(4095 + 256);
+  expect(heard).toHaveLength(1023 + 128);
   connection.close();
 });

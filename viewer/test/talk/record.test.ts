@@ -93,8 +93,22 @@ test('an answer without an end is kept as far as twenty thousand letters, quickl
     record.heard(progress);
     expect(sentence.follow(progress).text.length).toBeLessThanOrEqual(4100);
   }
-  expect(record.answered.length).toBe(202 * 100 - 1);
+  expect(record.answered.length).toBe(200 * 100 - 1);
   expect(performance.now() - begin).toBeLessThan(2000); // it was half a minute
+  record.heard({ utterance: 0, first: 5, text: 'b'.repeat(16_000), heard: 9 }); // in the place of another one
+  record.heard({ utterance: 0, first: 1000, text: '', heard: 0 });
+  expect(record.answered.length).toBe(200 * 100 - 1);
+  record.heard({ utterance: 0, first: 7, text: 'c'.repeat(99), heard: 98 });
+  expect(record.answered).toContain('c'.repeat(98));
   record.over(0, true);
   expect(record.answered.endsWith('a …')).toBe(true);
+});
+
+test('of talks before this one the last two hundred entries are kept', () => {
+  const record = new TalkRecord({ changed: () => {}, dropped: () => {}, renewed: () => {} });
+  for (let i = 0; i < 250; i++) {
+    record.begin(false);
+    record.asked(`${i}`);
+  }
+  expect([record.earlier.length, record.earlier.at(-1)!.text]).toEqual([200, '248']);
 });

@@ -93,7 +93,7 @@ def check_skinned(info: SkinnedInfo, require: Require) -> None:
     for name, (least, most) in ranges.items():
         inside = least <= getattr(info, name) <= most
         require(inside, f"skinned.{name}", f"lie between {least} and {most}")
-    require(0 < info.fps <= 1000, "skinned.fps", "lie between 0 and 1000")
+    require(limits.MIN_FPS <= info.fps <= limits.MAX_FPS, "skinned.fps", limits.FPS_RANGE)
     named = all(0 < len(name) <= LONGEST_NAME for name in info.names)
     require(named, "skinned.names", f"have 1 to {LONGEST_NAME} characters each")
     ordered = all(a <= b for a, b in zip(info.low, info.high, strict=True))

@@ -10,8 +10,8 @@ from ico3d.common.unpacking.npy import DAMAGED, array_head
 from ico3d.common.unpacking.npz import WIDTH
 from ico3d.errors import CaptureError
 
-LARGEST = 1 << 28
-"""Bytes of an array as numbers of 64 bits: eleven million points."""
+LARGEST = 1 << 26
+"""Bytes of an array as numbers of 64 bits: almost three million points."""
 
 
 def read_numbers(file: Path) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, Callable, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Iterator
+from itertools import chain, islice
 from typing import Protocol, runtime_checkable
 
 from pipecat.frames.frames import CancelFrame, EndFrame, ErrorFrame, Frame
@@ -48,7 +49,7 @@ class Collector(FrameProcessor):
 
 
 async def run(
-    processor: FrameProcessor, frames: Sequence[Frame], seconds: float
+    processor: FrameProcessor, frames: Iterable[Frame], seconds: float
 ) -> AsyncGenerator[Frame, None]:
     """Runs a service on some frames; yields its output while it is produced.
 
@@ -85,7 +86,7 @@ async def run(
     await runner.add_workers(worker)
     task = asyncio.create_task(runner.run())
     task.add_done_callback(lambda _: found.put_nowait(None))
-    feeding = asyncio.create_task(_feed(worker, processor, [*frames, EndFrame()]))
+    feeding = asyncio.create_task(_feed(worker, processor, chain(frames, [EndFrame()])))
     try:
         while True:
             # one wait at a time: whoever streams this may go on in another task
@@ -105,12 +106,12 @@ async def run(
         await asyncio.gather(task, feeding, return_exceptions=True)
 
 
-async def _feed(worker: PipelineWorker, processor: FrameProcessor, frames: Sequence[Frame]) -> None:
+async def _feed(worker: PipelineWorker, processor: FrameProcessor, frames: Iterator[Frame]) -> None:
     """Hands frames over no faster than the service takes them, and others get their turns."""
-    for at in range(0, len(frames), BATCH):
+    while batch := list(islice(frames, BATCH)):
         while isinstance(processor, KeepsWaiting) and processor.waiting > MOST_AHEAD:
             await asyncio.sleep(0.02)
-        await worker.queue_frames(frames[at : at + BATCH])
+        await worker.queue_frames(batch)
         await asyncio.sleep(0)
 
 

@@ -67,14 +67,14 @@ def _answer(said: list[TranscriptionFrame], duration: float, form: str) -> Respo
     return JSONResponse(facts)
 
 
-def heard(pcm: np.ndarray) -> list[Frame]:
+def heard(pcm: np.ndarray) -> Iterator[Frame]:
     """Frames for samples (S,) int16 at 16 kHz, as in a conversation with one stretch of speech."""
     pcm = np.concatenate([QUIET, pcm, QUIET])
-    starts = range(0, len(pcm), MICROPHONE_CHUNK)
-    pieces = [pcm[at : at + MICROPHONE_CHUNK].tobytes() for at in starts]
-    frames: list[Frame] = [InputAudioRawFrame(piece, MICROPHONE_RATE, 1) for piece in pieces]
-    frames.insert(min(LEAD_IN, len(frames)), VADUserStartedSpeakingFrame())
-    return [*frames, VADUserStoppedSpeakingFrame()]
+    for number, at in enumerate(range(0, len(pcm), MICROPHONE_CHUNK)):
+        if number == LEAD_IN:
+            yield VADUserStartedSpeakingFrame()
+        yield InputAudioRawFrame(pcm[at : at + MICROPHONE_CHUNK].tobytes(), MICROPHONE_RATE, 1)
+    yield VADUserStoppedSpeakingFrame()
 
 
 def read_wav(file: BinaryIO) -> np.ndarray:

@@ -1,11 +1,21 @@
 """Reads what a pickle would make of the objects in a file of weights, without making it."""
 
 import io
+import math
 import pickletools
 from typing import Any, cast
 
 from ico3d.errors import ModelError
 
+WIDTHS = {
+    **dict.fromkeys(("torch ByteStorage", "torch CharStorage", "torch BoolStorage"), 1),
+    **dict.fromkeys(("torch ShortStorage", "torch HalfStorage", "torch BFloat16Storage"), 2),
+    **dict.fromkeys(("torch IntStorage", "torch FloatStorage"), 4),
+    **dict.fromkeys(("torch LongStorage", "torch DoubleStorage", "torch ComplexFloatStorage"), 8),
+    "torch ComplexDoubleStorage": 16,
+    "torch.storage UntypedStorage": 1,
+}
+"""Bytes of a number of each kind."""
 MADE = {
     "collections OrderedDict",
     "torch Size",
@@ -56,10 +66,28 @@ class Bag:
     size = 0
 
 
-class _Machine:
-    """Goes through the steps of a pickle as torch does, with what they would make left out."""
+class Numbers:
+    """Numbers that lie in the file.
 
-    def __init__(self) -> None:
+    Attributes:
+        count: How many.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+
+class _Machine:
+    """Goes through the steps of a pickle as torch does, with what they would make left out.
+
+    Attributes:
+        left: Bytes of numbers that the file may still have.
+        sizes: Bytes of those that were named, by their name.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.left = size
+        self.sizes: dict[str, int] = {}
         self.stack: list[Any] = []
         self.marks: list[list[Any]] = []
         self.memo: dict[int, Any] = {}
@@ -86,7 +114,7 @@ class _Machine:
         elif name in ("BINGET", "LONG_BINGET"):
             stack.append(self.memo[argument])
         elif name == "BINPERSID":
-            stack[-1] = None
+            stack[-1] = self.numbers(stack[-1])
         elif name not in ("PROTO", "STOP"):
             self.change(name)
 
@@ -113,6 +141,25 @@ class _Machine:
         else:
             raise ValueError(f"it has a step ({name}) that no file of weights has")
 
+    def numbers(self, told: Any) -> Numbers:
+        """What a pickle says of numbers that lie elsewhere in the file.
+
+        Raises:
+            ValueError: If they are more than the file has, or of no kind that is known.
+        """
+        said = list(cast(tuple[Any, ...], told)) if isinstance(told, tuple) else []
+        kind, what, key, place, count, *view = said + [None] * (5 - len(said))
+        width = WIDTHS.get(what) if isinstance(what, Name) else None
+        named = kind == "storage" and type(key) is str and type(place) is str
+        if width is None or not named or type(count) is not int or count < 0 or any(view):
+            raise ValueError("it has numbers of no kind that weights have")
+        size = count * width
+        if key not in self.sizes:
+            self.left -= size
+        if self.sizes.setdefault(key, size) != size or self.left < 0:
+            raise ValueError("it names more numbers than it has")
+        return Numbers(count)
+
     def fill(self, items: list[Any], count: int) -> None:
         """Adds members; a tuple of tuples as a key would be gone through again and again."""
         if count == 2 and any(isinstance(key, tuple) for key in items[::2]):
@@ -125,7 +172,9 @@ def _made(name: str, argument: Any) -> Any:
         return Name(argument)
     if name == "EMPTY_TUPLE":
         return ()
-    return Bag() if name.startswith("EMPTY") else None
+    if name.startswith("EMPTY"):
+        return Bag()
+    return {"NEWTRUE": True, "NEWFALSE": False}.get(name, argument)
 
 
 def _called(what: Any, given: Any) -> Any:
@@ -142,13 +191,49 @@ def _called(what: Any, given: Any) -> Any:
             raise ValueError("it copies a dictionary")
         return Bag()
     if what == "torch Size":
-        axes = inner[0] if len(inner) == 1 else None
-        if not isinstance(axes, tuple) or len(cast(tuple[Any, ...], axes)) > MOST_MEMBERS:
-            raise ValueError("it has a size of more axes than tensors have")
+        _axes(inner[0] if len(inner) == 1 else None)
+    elif "_rebuild_tensor" in what:
+        _check_tensor(*inner)
     return None
 
 
-def check_pickles(file: Any, pickles: int, needed: Any, what: str) -> None:
+def _axes(given: Any) -> tuple[int, ...]:
+    """The numbers of a tuple with one for each axis of a tensor.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    axes = cast(tuple[int, ...], given)
+    if not isinstance(given, tuple) or len(axes) > MOST_MEMBERS:
+        raise ValueError("it has a size of more axes than tensors have")
+    if not all(type(axis) is int and axis >= 0 for axis in axes):
+        raise ValueError("it has a size of no numbers, not of axes")
+    return axes
+
+
+def _check_tensor(numbers: Any, offset: Any, size: Any, stride: Any, *more: Any) -> None:
+    """Refuses a tensor that is larger than its numbers, for which torch would make room.
+
+    Args:
+        numbers: The `Numbers`.
+        offset: Index of the first one.
+        size: Length of each axis.
+        stride: How far the next number along each axis is.
+        more: Whether it is trained, what is called then, and remarks, of which there may be none.
+
+    Raises:
+        ValueError: If it is so.
+    """
+    sizes, strides = _axes(size), _axes(stride)
+    if not isinstance(numbers, Numbers) or type(offset) is not int or len(sizes) != len(strides):
+        raise ValueError("it makes a tensor of something else than numbers")
+    last = offset + sum((n - 1) * step for n, step in zip(sizes, strides, strict=True))
+    inside = 0 <= offset <= numbers.count and math.prod(sizes) <= numbers.count
+    if not inside or (0 not in sizes and last >= numbers.count) or any(more[2:]):
+        raise ValueError("it has a tensor that is larger than its numbers")
+
+
+def check_pickles(file: Any, pickles: int, needed: Any, what: str, size: int) -> None:
     """Goes through some pickles one after the other, without making anything of them.
 
     Args:
@@ -156,6 +241,7 @@ def check_pickles(file: Any, pickles: int, needed: Any, what: str) -> None:
         pickles: How many.
         needed: Expression that the names in them match.
         what: The file, for errors.
+        size: Bytes of the whole file, which no numbers in it exceed.
 
     Raises:
         ModelError: If they make more than weights, or name or call something else.
@@ -164,7 +250,7 @@ def check_pickles(file: Any, pickles: int, needed: Any, what: str) -> None:
     content = io.BytesIO(file.read(MOST_BYTES))
     left = MOST_STEPS
     for _ in range(pickles):
-        machine = _Machine()
+        machine = _Machine(size)
         for opcode, argument, _ in pickletools.genops(content):
             left -= 1
             if left < 0:
@@ -178,5 +264,5 @@ def check_pickles(file: Any, pickles: int, needed: Any, what: str) -> None:
                 )
             try:
                 machine.step(opcode.name, argument)
-            except (IndexError, KeyError, AttributeError) as error:
+            except (IndexError, KeyError, AttributeError, TypeError) as error:
                 raise ValueError("its steps do not fit one another") from error

@@ -61,7 +61,7 @@ def _check_archive(path: Path, file: BinaryIO) -> None:
         for entry, name in zip(entries, names, strict=True):
             if name.endswith(".pkl"):
                 with archive.open(entry) as pickled:
-                    check_pickles(pickled, 1, NEEDED, str(path))
+                    check_pickles(pickled, 1, NEEDED, str(path), path.stat().st_size)
 
 
 def _check_old(path: Path, file: BinaryIO) -> None:
@@ -73,7 +73,7 @@ def _check_old(path: Path, file: BinaryIO) -> None:
         tarfile.TarInfo.frombuf(head, tarfile.ENCODING, "surrogateescape")
     except tarfile.HeaderError:
         file.seek(0)
-        check_pickles(file, OLD_PICKLES, NEEDED, str(path))
+        check_pickles(file, OLD_PICKLES, NEEDED, str(path), path.stat().st_size)
     else:
         raise ModelError(f"{path} passes for two kinds of files: it is not read.")
 

@@ -20,6 +20,7 @@ export class Captions {
   private utterance: number | null = null; // that is heard
   private quiet = false; // nobody listens, thinks or speaks
   private scrolling: number | undefined; // the request for it
+  private read = { text: '', time: LEAST }; // how long what was said stays
 
   /**
    * @param lang language of the talk; empty if it is unknown
@@ -69,6 +70,7 @@ export class Captions {
 
   /** @param quiet nobody listens, thinks or speaks: what was said goes once it could be read */
   rest(quiet: boolean): void {
+    if (quiet === this.quiet) return;
     this.quiet = quiet;
     this.settle();
   }
@@ -83,8 +85,14 @@ export class Captions {
 
   private settle(): void {
     const { quiet, utterance, leaving } = this;
-    if (quiet && utterance === null) leaving.after(timeToRead(this.heardWords.textContent!));
+    if (quiet && utterance === null) leaving.after(this.timeToRead());
     else leaving.stay();
+  }
+
+  private timeToRead(): number {
+    const text = this.heardWords.textContent!;
+    if (text !== this.read.text) this.read = { text, time: timeToRead(text) };
+    return this.read.time;
   }
 
   private write(heard: string, next: string): void {

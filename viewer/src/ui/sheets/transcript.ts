@@ -36,6 +36,9 @@ export class Transcript {
   private began = new Date(); // the talk
   private recalls = false; // the avatar was told what the visitor said in earlier ones
   private announced = 0; // entries that screen readers have heard
+  private readonly news = new Set<Entry>(); // not drawn yet
+  private anew = false; // all is to be drawn
+  private drawing: number | undefined; // the request for it
   private readonly keep: () => void;
   private readonly cleared: () => void;
 
@@ -120,10 +123,23 @@ export class Transcript {
     this.began = new Date();
     this.announced = 0;
     byId(this.page, 'announcer').replaceChildren();
-    this.draw();
+    this.anew = true;
+    this.drawSoon();
+  }
+
+  /** Draws what is new, once for all that comes until the next picture: each time the page finds the place of everything. */
+  private drawSoon(): void {
+    this.drawing ??= requestAnimationFrame(() => {
+      this.drawing = undefined;
+      if (this.anew) return this.draw();
+      for (const entry of this.news) this.show(entry);
+      this.news.clear();
+    });
   }
 
   private draw(): void {
+    this.anew = false;
+    this.news.clear();
     this.rows.clear();
     const { earlier, entries } = this.record;
     const before = [this.divider(this.aboutEarlier()), ...earlier.map((entry) => this.row(entry)), this.divider(this.aboutNow())];
@@ -132,11 +148,13 @@ export class Transcript {
   }
 
   private changed(entry: Entry): void {
-    this.show(entry);
+    this.news.add(entry);
+    this.drawSoon();
     this.keep();
   }
 
   private dropped(entry: Entry): void {
+    this.news.delete(entry);
     this.rows.get(entry)?.remove();
     this.rows.delete(entry);
     this.announced = Math.max(0, this.announced - 1);
