@@ -24,6 +24,7 @@ from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.embodying.builds.change import change_to
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.avatar.staging import thumbnail
+from ico3d.bundle.animation import ANIMATION, Rest
 from ico3d.bundle.format import THUMBNAIL, Bundle, coarse_first, write_bundle
 from ico3d.bundle.head import HEAD as HEAD_FILE
 from ico3d.bundle.head import HEAD_REST
@@ -49,6 +50,8 @@ GESTURES = ("wave", "point", "open_hands", "shrug", "count_three", "nod", "shake
 """To look at: hands, armpits and neck in poses that nobody recorded."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 MAKER = "the authors of ico3d"
+RESTS = Rest(16, 17)
+"""Frames of the body's recording in which she nods a little, with hanging arms."""
 LIGHT = "soft"
 """What an arm shades in the recording stays dark in every pose: its shade should be faint."""
 SLENDER = 0.8
@@ -207,18 +210,25 @@ def slenderer(person: dict[str, np.ndarray], share: float) -> dict[str, np.ndarr
 
 
 def write_finished(path: Path) -> None:
-    """Moves the arms of a bundle's body inwards, with its gestures, and takes red from its skin."""
+    """Moves the arms of a bundle's body inwards, with its gestures, and takes red from its skin.
+
+    She rests where her arms hang: a rule would have her rest where hands are still for longest, at
+    her chin.
+    """
     bundle = Bundle.open(path)
     head, poses = bundle.require_head()
     assert bundle.skinned is not None and bundle.manifest.head is not None
+    assert bundle.animation is not None  # its body moves
     body = muted(narrower(bundle.skinned))
     old = (HEAD_REST, SKINNED_REST)
     files = {name: bundle.read(name) for name in bundle.manifest.files if name not in old}
     files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()}
     files |= gesture_files(body, (), 1.0)
     person = BakedAvatar(head, SkinnedBody(body), poses)
-    first = person.gaussians(0.0, bundle.manifest.head.idle_expression)
-    files[THUMBNAIL] = thumbnail(first, bundle.manifest.camera, bundle.manifest.background)
+    files[ANIMATION] = replace(bundle.animation, rest=RESTS).to_bytes()
+    seconds = RESTS.end / bundle.animation.fps
+    resting = person.gaussians(seconds, bundle.manifest.head.idle_expression)
+    files[THUMBNAIL] = thumbnail(resting, bundle.manifest.camera, bundle.manifest.background)
     info = replace(bundle.manifest.head, num_rest=0)
     manifest = replace(bundle.manifest, head=info, skinned=replace(body.info, num_rest=0))
     write_bundle(path, *coarse_first(manifest, files))
