@@ -89,7 +89,7 @@ def _drawn(
     assert bones is not None  # whole
     joints = bones.matrices(to_matrix(pose[0])[None], pose[1][None])[0]  # (J, 4, 4)
     joints[:, :3, 3] += subject.head_in_world
-    head = joints[bones.index("head")]
+    head: Array = joints[bones.index("head")]
     moved = np.einsum("ab,jbc->jac", np.linalg.inv(head), joints)
     vertices = bones.skinned(subject.vertices, moved)
     picture, seen = studio.picture(camera, studio.figure(vertices.astype(np.float32), head))
