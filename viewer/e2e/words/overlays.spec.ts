@@ -141,7 +141,7 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
     });
 
     test.each(['', 'large'])('goes through a long sentence by pages, each of which is seen as a whole (captions: %s)', async (size) => {
-      const pages = await page.evaluate(([text, size]) => {
+      const pages = await page.evaluate(async ([text, size]) => {
         document.documentElement.dataset.captionsSize = size;
         const answer = document.getElementById('answer')!;
         const view = (window.ico3d!.conversation as unknown as { view: ConversationView }).view;
@@ -159,11 +159,13 @@ describe.skipIf(!demoUrl)('what is around the picture of the packaged demo', () 
         };
         const { width, height } = answer.getBoundingClientRect();
         const room = [width, height, getComputedStyle(answer).fontSize].join();
-        const pages = ((window.pages ??= {})[room] ??= ends.map(([, heard]) => {
+        const pages = ((window.pages ??= {})[room] ??= []);
+        for (const [, heard] of pages.length > 0 ? [] : ends) {
           view.heard({ utterance: 1e6, first: 0, text, heard });
+          await null; // until the page has turned
           const [isSaid, isNext] = [...answer.children].map(({ firstChild }) => firstChild && seenIn(firstChild));
-          return ends.map(([from, to]) => (to <= heard ? isSaid!(from, to - 1) : isNext!(from - heard, to - heard - 1)));
-        }));
+          pages.push(ends.map(([from, to]) => (to <= heard ? isSaid!(from, to - 1) : isNext!(from - heard, to - heard - 1))));
+        }
         delete document.documentElement.dataset.captionsSize;
         return pages;
       }, [LONG.trim(), size] as const);

@@ -19,7 +19,7 @@ export class Captions {
   private readonly leaving: Leaving;
   private utterance: number | null = null; // that is heard
   private quiet = false; // nobody listens, thinks or speaks
-  private scrolling: number | undefined; // the request for it
+  private scrolls = false; // as soon as all is written
   private read = { text: '', time: LEAST }; // how long what was said stays
 
   /**
@@ -98,7 +98,9 @@ export class Captions {
   private write(heard: string, next: string): void {
     this.heardWords.textContent = heard;
     this.nextWords.textContent = next;
-    this.scrolling ??= requestAnimationFrame(() => this.scroll()); // once for all that is written until then
+    if (this.scrolls) return;
+    this.scrolls = true;
+    queueMicrotask(() => this.scroll()); // once for all that is written until then
   }
 
   /**
@@ -106,7 +108,7 @@ export class Captions {
    * of a page are seen at once, those that are still to come dimly: the last ones would go as soon as they are heard.
    */
   private scroll(): void {
-    this.scrolling = undefined;
+    this.scrolls = false;
     const { answered, heardWords, cut } = this;
     answered.classList.toggle('paged', answered.scrollHeight - answered.clientHeight > 1);
     const last = [...heardWords.getClientRects()].at(-1);

@@ -114,6 +114,7 @@ export class Transcript {
 
   private clear(): void {
     this.record.clear();
+    this.draw(); // who cleared it sees so
     this.talker.kept.write([]);
     this.cleared();
     this.tell(say('transcript.cleared', { name: this.talker.name }));

@@ -1,6 +1,6 @@
 """How much bundles look like the studio's person in the gestures of the package.
 
-    python bench/gestures.py human_face_f.npz A.ico3d B.ico3d --light soft
+    python bench/studio_pictures/gestures.py human_face_f.npz A.ico3d B.ico3d --light soft
 
 The person is drawn by the studio at the stroke of each gesture, in the pose that the first bundle
 would take, and so is the body of each bundle. PSNR is over what is seen of the person but the face,
