@@ -10,6 +10,7 @@ from ico3d.avatar.baked_body import skinned_gaussians
 from ico3d.avatar.baking.importance import gaussian_importance
 from ico3d.avatar.baking.skinned import skinned_bundle
 from ico3d.avatar.baking.skinned.quantised import Clip, quantised
+from ico3d.avatar.poseable import poseable_of
 from ico3d.avatar.render_bundle import render_body, visitor_camera
 from ico3d.body.model_folder import TrainedBody, save_window
 from ico3d.body.planning.windows import Window
@@ -96,6 +97,15 @@ def test_more_of_what_pages_show_comes_first(person, monkeypatch):
         heights = skinned_bundle.bake(person, None).baked.means[:, 1]
         shares.append((heights[:196] > 0.55 * heights.max()).mean())
     assert shares[1] > shares[0] + 0.05
+
+
+def test_somebody_who_stands_still_counts_as_well(person):
+    """A body with the joints of a person is drawn with hanging arms, where pages show it so."""
+    found = skinned_bundle._at_rest(person)
+    known = poseable_of(person, None)
+    assert len(found) == (known is not None)
+    for drawn in found:
+        assert len(drawn) == 400 and drawn.means.isfinite().all()
 
 
 def test_importance_is_what_a_picture_lacks_without_a_gaussian():

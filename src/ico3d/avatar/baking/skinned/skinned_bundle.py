@@ -16,6 +16,7 @@ from ico3d.avatar.baking.skinned.hands import evened
 from ico3d.avatar.baking.skinned.quantised import Clip, quantised
 from ico3d.avatar.clip_views import recorded_views
 from ico3d.avatar.moving import MOMENTS
+from ico3d.avatar.poseable import poseable_of
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.skinning.skinned import Skinned
 from ico3d.bundle.manifest import Loss
@@ -25,11 +26,14 @@ from ico3d.bundle.skinned.info import SKINNED
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
 from ico3d.motion.recorded.cut import Cut
+from ico3d.splat.gaussians import Gaussians
 
 PROBES = 24
 """Pictures of the whole person from which the importance of Gaussians is estimated."""
 UPPER = 0.45
 """Share of the person's height that as many more pictures show: what pages show at first."""
+NEAR = 8
+"""Cameras around that share, each of which also sees somebody who stands still, as in pages."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,10 @@ def bake(
         low, high = seen_box(exact, np.linspace(0, 1, MOMENTS).tolist())
     ring, span = body_cost.ring_of_cameras(low, high), body.windows[0]
     waist = np.array([low[0], high[1] - UPPER * (high[1] - low[1]), low[2]])
-    near = body_cost.ring_of_cameras(waist, high)
+    near = body_cost.ring_of_cameras(waist, high, NEAR)
     views = [v for cameras in (ring, near) for v in body_cost.probe_views(cameras, span, PROBES)]
     poses = [(exact(view.tau), view.camera) for view in views]
+    poses += [(drawn, camera) for drawn in _at_rest(body) for camera in near]
     importance = gaussian_importance(poses, views[0].background, 0)
     clip = Clip(body.fps, staging.triple(low), staging.triple(high))
     baked = quantised(body.models[0], clip, importance)
@@ -102,6 +107,17 @@ def bake(
     loss = body_cost.measure(*pair, recorded, probes)
     shown = evened(baked)  # not before: the loss is that of fewer bits
     return SkinnedResult(shown, shown.to_bytes(), loss, cuts)
+
+
+def _at_rest(body: TrainedBody) -> list[Gaussians]:
+    """The person with hanging arms, once; none whose skeleton is not that of a person."""
+    person = poseable_of(body, None)
+    if person is None:
+        return []
+    living = person.living
+    place = person.footing.place(living.person.retarget.pose(living.hung), np.zeros(3))
+    with torch.no_grad():
+        return [person.body(*place)]
 
 
 def check(result: SkinnedResult) -> None:
