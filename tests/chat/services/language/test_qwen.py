@@ -63,7 +63,7 @@ async def test_an_interruption_stops_the_generation(bundle, endless):
         then = 0
         while then != len(made):  # on a busy machine, what is under way takes a while
             then = len(made)
-            await asyncio.sleep(1.0)
+            await asyncio.sleep(3.0)
         await asyncio.sleep(0.5)
         assert 0 < then < 3000 and len(made) == then
         await page.close()
