@@ -74,13 +74,18 @@ test('a message of no known type is refused', () => {
   expect(() => decode('{"type": "hello"}')).toThrow(/unknown message hello/);
 });
 
+/** A binary frame with a head, and so many bytes of zeros behind it. */
+function binaryFrame(header: object, body = 0): ArrayBuffer {
+  const text = new TextEncoder().encode(JSON.stringify(header));
+  const frame = new Uint8Array(4 + text.length + body);
+  new DataView(frame.buffer).setUint32(0, text.length, true);
+  frame.set(text, 4);
+  return frame.buffer;
+}
+
 /** A frame of speech with sizes that may not be those of its sound (2,) and expressions (1, 3). */
 function speechFrame(pcm: unknown, expressions: unknown, padding = 0): ArrayBuffer {
-  const header = new TextEncoder().encode(JSON.stringify({ type: 'speech', utterance: 1, index: 0, first_sample: 0, first_expression: 0, pcm, expressions }));
-  const frame = new Uint8Array(4 + header.length + 2 * 2 + 2 * 3 + padding);
-  new DataView(frame.buffer).setUint32(0, header.length, true);
-  frame.set(header, 4);
-  return frame.buffer;
+  return binaryFrame({ type: 'speech', utterance: 1, index: 0, first_sample: 0, first_expression: 0, pcm, expressions }, 2 * 2 + 2 * 3 + padding);
 }
 
 test('a frame of speech must hold what its sizes say', () => {
@@ -114,14 +119,6 @@ test('a message that is longer than any may be is not even parsed', () => {
   expect(() => decode(wide.slice(0, -1))).toThrow(/bytes instead of/);
   expect(() => decode(`{"type": "state", "state": "${'a'.repeat(MAX_TEXT_FRAME)}"}`)).toThrow(/more than 16384 bytes/);
 });
-
-function binaryFrame(header: object, body = 0): ArrayBuffer {
-  const text = new TextEncoder().encode(JSON.stringify(header));
-  const frame = new Uint8Array(4 + text.length + body);
-  new DataView(frame.buffer).setUint32(0, text.length, true);
-  frame.set(text, 4);
-  return frame.buffer;
-}
 
 test('each message travels in its kind of frame, and a head is no longer than a text', () => {
   expect(() => decode(binaryFrame({ type: 'answer', utterance: 5, first_sample: 0, text: 'a' }))).toThrow(/answer is no message of a binary frame/);
