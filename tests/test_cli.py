@@ -188,6 +188,35 @@ assert not heavy, heavy
     assert done.returncode == 0, done.stderr
 
 
+MEMORY = """
+import sys
+import numpy, torch
+from ico3d import cli
+from ico3d.common.unpacking import limits
+
+class Takes:
+    def run(self):
+        print(len(TAKEN))
+
+limits.LEAST_BYTES, limits.free_memory = 32 << 20, lambda: 128 << 20
+cli.parsed = lambda verb, words: Takes()
+sys.argv = ["ico3d", VERB, "x"]
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.parametrize("taken", ["numpy.ones(1 << 25)", "torch.ones(1 << 26)"])
+def test_a_command_takes_no_more_memory_than_is_free(taken):
+    """Whichever library asks for it: a stranger's file ends the command, and nothing beside it."""
+    program = MEMORY.replace("TAKEN", taken)
+    for verb, status in {"convert": 1, "serve": 0}.items():  # a server runs for weeks
+        words = [sys.executable, "-c", program.replace("VERB", repr(verb))]
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == status
+        assert ("memory ran out" in done.stderr) == (status == 1)
+        assert "Traceback" not in done.stderr
+
+
 def test_processes_that_are_started_import_nothing_from_the_current_folder(monkeypatch, capsys):
     monkeypatch.setenv("PYTHONSAFEPATH", "")
     monkeypatch.delenv("PYTHONSAFEPATH")

@@ -10,7 +10,10 @@ from typing import Any
 import tyro
 
 from ico3d import __version__
+from ico3d.common.unpacking.limits import limit_to_free_memory
+from ico3d.common.unpacking.memory import ran_out
 from ico3d.errors import Ico3dError
+from ico3d.failures import FAILURES
 from ico3d.training.notes.state import carried_out
 
 
@@ -92,6 +95,10 @@ VERBS: dict[str, Verb] = {
     ),
 }
 
+SERVERS = {"demo", "studio", "serve", "serve-module"}
+"""Verbs that run for weeks, in which others' programs end and leave room: what they take is bounded
+by what they serve."""
+
 
 STYLE = (tyro.conf.PositionalMetavarFromFieldName, tyro.conf.DisallowNone)
 """How options are made of settings."""
@@ -146,6 +153,8 @@ def main(arguments: list[str] | None = None) -> int:
     verb = verb_of(words)
     if verb is None:
         return _list_verbs(words)
+    if arguments is None and verb not in SERVERS:
+        limit_to_free_memory()
 
     def run() -> int | None:
         settings = parsed(verb, words[len(verb.split()) :])
@@ -176,6 +185,11 @@ def ended(run: Callable[[], int | None]) -> int:
         return run() or 0
     except Ico3dError as error:
         print(f"ico3d: {error}", file=sys.stderr)
+        return 1
+    except (MemoryError, RuntimeError) as error:
+        if not ran_out(error):
+            raise
+        print(f"ico3d: {FAILURES['memory']}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130

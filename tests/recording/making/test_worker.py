@@ -76,7 +76,7 @@ def test_a_voice_is_cloned_only_of_those_who_agreed_to_it(person, asked, tmp_pat
 def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
     _recorded(person, tmp_path, "consent", "text-1")
     monkeypatch.setattr(worker, "end_with_parent", lambda: None)
-    monkeypatch.setattr(worker, "limit_memory", lambda _: None)  # it would stay
+    monkeypatch.setattr(worker, "limit_to_free_memory", lambda: None)  # it would stay
     monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick", "demo"])
     assert worker.main() == 0
     monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick"])
@@ -95,9 +95,10 @@ def test_a_making_that_takes_more_than_is_free_ends_with_a_sentence(person, tmp_
     code = (
         "import contextlib, pathlib, sys\n"
         "import numpy, torch\n"
+        "from ico3d.common.unpacking import limits\n"
         "from ico3d.recording.making import worker\n"
         "from ico3d.recording.making.progress import read_progress\n"
-        "worker.LEAST_BYTES, worker.free_memory = 64 << 20, lambda: 256 << 20\n"
+        "limits.LEAST_BYTES, limits.free_memory = 64 << 20, lambda: 256 << 20\n"
         f"sys.argv = ['worker', {str(person.folder)!r}, 'quick']\n"
         "worker.create = lambda settings, tell: numpy.ones(1 << 28)\n"
         "with contextlib.suppress(MemoryError):\n"

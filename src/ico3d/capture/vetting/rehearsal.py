@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ico3d.capture.vetting.limits import limit_addresses, limit_seconds, taken
+from ico3d.common.unpacking.limits import limit_addresses, limit_seconds, taken
 from ico3d.errors import CaptureError
 
 MOST_SECONDS = 5

@@ -4,12 +4,20 @@ from pathlib import Path
 
 import psutil
 
+TORCH_LACKS = "can't allocate memory"
+"""What torch says where memory runs out: its error is a RuntimeError."""
+
 
 def free_memory() -> int:
     """Bytes that programs can still have: of the machine, or of the container they run in."""
     free = psutil.virtual_memory().available
     group = _free_in_group(_own_group())
     return free if group is None else min(free, group)
+
+
+def ran_out(error: BaseException) -> bool:
+    """Whether an error says that memory ran out, whichever library raises it."""
+    return isinstance(error, MemoryError) or TORCH_LACKS in str(error)
 
 
 def lacks_room(path: Path, times: int) -> str:

@@ -13,8 +13,8 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from ico3d.capture.vetting.limits import limit_memory, limit_seconds
 from ico3d.common.typed import plain
+from ico3d.common.unpacking.limits import limit_memory, limit_seconds
 from ico3d.creating.looking.advice import Advice
 from ico3d.errors import CaptureError
 from ico3d.recording.beside import end_with_parent, start, stop

@@ -9,14 +9,13 @@ import os
 import re
 import shutil
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, cast
 
 from ico3d.avatar.embodying.look import UNCHANGED, Look
-from ico3d.capture.vetting.limits import limit_memory
 from ico3d.common.files import json_of, write_atomic
-from ico3d.common.unpacking.memory import free_memory
+from ico3d.common.unpacking.limits import limit_to_free_memory
+from ico3d.common.unpacking.memory import ran_out
 from ico3d.creating.create import create
 from ico3d.creating.settings import CreateSettings, QualityName
 from ico3d.errors import CaptureError, Ico3dError, printable
@@ -28,12 +27,6 @@ from ico3d.recording.making.joining import join
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun
 from ico3d.recording.making.sources import signature, sources
-
-TORCH_LACKS = "can't allocate memory"
-"""What torch says where memory runs out: its error is a RuntimeError."""
-LEAST_BYTES = 8 << 30
-"""Memory that a making may take where less is free: 12 s of 1080p at `best` took 1.7 GB as its
-training began, on two cores of a shared cloud machine (2026-11-27)."""
 
 
 def make(
@@ -82,7 +75,7 @@ def make(
 
 def _failure(error: Exception, folder: Path) -> dict[str, Any]:
     """What the progress says of an error; one that nobody foresaw has no code."""
-    if isinstance(error, MemoryError) or TORCH_LACKS in str(error):
+    if ran_out(error):
         return {"error": FAILURES["memory"], "code": "memory"}
     if not isinstance(error, Ico3dError):
         return {"error": printable(f"{type(error).__name__}: {error}")}
@@ -129,8 +122,7 @@ def main() -> int:
     It takes no more memory than is free: beyond that, it ends with a sentence, not with the server.
     """
     end_with_parent()
-    if find_spec("resource") is not None:
-        limit_memory(max(free_memory(), LEAST_BYTES))
+    limit_to_free_memory()
     folder, quality, *on = sys.argv[1:]
     body, look = (Path(on[0]), Look(*cast(list[Any], on[1:]))) if on else (None, UNCHANGED)
     try:
