@@ -368,8 +368,6 @@ export type ClientMessage = HelloMessage | NotesMessage | AudioMessage | TextMes
 
 export type ServerMessage = WelcomeMessage | PlaceMessage | AckMessage | BeatMessage | StateMessage | TranscriptMessage | AnswerMessage | SpokenMessage | SpeechMessage | TimelineMessage | CuesMessage | CallMessage | EndMessage | StopMessage | PauseMessage | ResumeMessage | MetricsMessage | ErrorMessage;
 
-export const SERVER_TYPES = ["welcome", "place", "ack", "beat", "state", "transcript", "answer", "spoken", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
-
 /** The arrays of binary messages, in order. */
 export const TENSORS: Record<string, readonly Tensor[]> = {
   audio: [["pcm", "int16"]],

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ico3d.chat.conversation import Conversation
-from ico3d.chat.generating import reference, shared, typescript
+from ico3d.chat.generating import fields, reference, shared, typescript
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import (
     OversizedError,
@@ -195,10 +195,11 @@ def test_every_message_of_a_page_has_a_handler():
     ("target", "made"),
     [
         (typescript.TARGET, typescript.typescript),
+        (fields.TARGET, fields.typescript),
         (shared.TARGET, shared.typescript),
         (reference.TARGET, reference.markdown),
     ],
-    ids=["protocol.ts", "shared.ts", "protocol.md"],
+    ids=["protocol.ts", "fields.ts", "shared.ts", "protocol.md"],
 )
 def test_what_is_generated_is_up_to_date(target, made):
     assert target.read_text(encoding="utf-8") == made(), "run python -m ico3d.chat.generating"

@@ -6,6 +6,13 @@ const LEAD = Math.round(0.05 * SPEECH_RATE); // more for a first piece: room for
 /** Frames from full sound to silence and back. */
 export const FADE = Math.round(0.008 * SPEECH_RATE); // with the guard before it, silence comes within 30 ms
 
+/** Samples of the longest utterance: 20 minutes. What lies beyond is not played. */
+const LONGEST = 1200 * SPEECH_RATE;
+/** Samples that what goes on after a pause is joined to, so that pauses cost the same however small its pieces were. */
+const STRETCH = 10 * SPEECH_RATE;
+/** Stretches that go on after a pause: an honest utterance has no gaps, so 64 are more than ten minutes. */
+const MOST_STRETCHES = 64;
+
 /** 100–200 ms of an utterance: sound and face. */
 export type Piece = Omit<SpeechMessage, 'type' | 'index'>;
 
@@ -19,9 +26,12 @@ export interface Sink {
   fade(from: number, to: number, start: number): void;
 }
 
-interface Part {
+interface Sound {
   first: number; // sample of the utterance
   pcm: Int16Array;
+}
+
+interface Part extends Sound {
   end: number; // frame after its last one
   stop: (frame: number) => void;
 }
@@ -34,7 +44,7 @@ export class Voice {
   samples: number | null = null; // in all, once the server has said it
   private readonly sink: Sink;
   private parts: Part[] = []; // that sound or will
-  private waiting: { first: number; pcm: Int16Array }[] = []; // while it is paused
+  private waiting: Sound[] = []; // while it is paused
   private held: number | null = null; // sample with which it goes on
 
   constructor(utterance: number, sink: Sink) {
@@ -53,7 +63,7 @@ export class Voice {
    */
   add({ first_expression, expressions, first_sample: first, pcm }: Piece, earliest = 0): void {
     this.track.add(first_expression, expressions);
-    if (pcm.length === 0) return;
+    if (pcm.length === 0 || first + pcm.length > LONGEST) return;
     if (this.paused) this.waiting.push({ first, pcm });
     else this.place(first, pcm, earliest);
   }
@@ -73,7 +83,7 @@ export class Voice {
     const { held, waiting } = this;
     this.held = null;
     this.waiting = [];
-    const starts = waiting.map(({ first, pcm }) => {
+    const starts = stretches(waiting).map(({ first, pcm }) => {
       const skip = Math.max(0, held - first);
       return this.place(first + skip, skip > 0 ? pcm.subarray(skip) : pcm, 0);
     });
@@ -95,4 +105,29 @@ export class Voice {
     this.parts.push({ first, pcm, end: start + pcm.length, stop: this.sink.play(pcm, start) });
     return start;
   }
+}
+
+/** Pieces joined where one follows the other. */
+function stretches(pieces: Sound[]): Sound[] {
+  const groups: Sound[][] = [];
+  let end = NaN; // sample after the newest one
+  let length = 0; // of the newest group
+  for (const piece of pieces) {
+    const follows = piece.first === end && length + piece.pcm.length <= STRETCH;
+    if (!follows && groups.length === MOST_STRETCHES) break;
+    if (follows) groups.at(-1)!.push(piece);
+    else groups.push([piece]);
+    length = (follows ? length : 0) + piece.pcm.length;
+    end = piece.first + piece.pcm.length;
+  }
+  return groups.map(joined);
+}
+
+/** One piece stays the same object: whoever plays it again has it ready. */
+function joined(group: Sound[]): Sound {
+  const [head] = group as [Sound];
+  if (group.length === 1) return head;
+  const pcm = new Int16Array(group.reduce((sum, one) => sum + one.pcm.length, 0));
+  for (const one of group) pcm.set(one.pcm, one.first - head.first);
+  return { first: head.first, pcm };
 }

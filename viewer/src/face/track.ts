@@ -1,9 +1,13 @@
 import type { Matrix } from '../protocol.ts';
 
+/** Numbers that are kept: an hour of a face has a tenth of them. */
+const MOST_VALUES = 1 << 25;
+
 /** The expressions of one utterance: row j belongs to j / fps seconds of its sound. */
 export class ExpressionTrack {
   private readonly rows: Float32Array[] = [];
   private readonly fps: number;
+  private kept = 0; // numbers
   private first = Infinity; // row that is known; a page may join an utterance late
 
   constructor(fps: number) {
@@ -12,6 +16,8 @@ export class ExpressionTrack {
 
   /** Adds rows from index `first` on. */
   add(first: number, { rows, columns, values }: Matrix): void {
+    this.kept += values.length;
+    if (this.kept > MOST_VALUES) return;
     this.first = Math.min(this.first, first);
     for (let i = 0; i < rows; i++) this.rows[first + i] = values.subarray(i * columns, (i + 1) * columns);
   }

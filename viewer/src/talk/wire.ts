@@ -1,5 +1,7 @@
 import { floatsFromHalves } from '../half.ts';
-import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, SERVER_TYPES, TENSORS, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
+import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, TENSORS, VERSION, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
+import { SERVER_FIELDS } from './line/fields.ts';
+import { fits } from './line/shape.ts';
 
 /** What is done with each of some messages: the compiler misses none. */
 export type Handlers<M extends ServerMessage> = {
@@ -70,10 +72,13 @@ function isShape(sizes: unknown, axes: number): sizes is number[] {
   return Array.isArray(sizes) && sizes.length === axes && sizes.every((size) => Number.isInteger(size) && size >= 0 && size <= MAX_BINARY_FRAME);
 }
 
-/** What has no arrays travels as text: of that, less may come than of sound. */
+/** What has no arrays travels as text: of that, less may come than of sound. A welcome of another version may consist of anything. */
 function checked(header: Header, binary: boolean): ServerMessage {
-  if (!SERVER_TYPES.includes(header.type)) throw new Error(`unknown message ${header.type}`);
+  const fields = Object.hasOwn(SERVER_FIELDS, header.type) ? SERVER_FIELDS[header.type] : undefined;
+  if (!fields) throw new Error(`unknown message ${header.type}`);
   if (Object.hasOwn(TENSORS, header.type) !== binary) throw new Error(`${header.type} is no message of a ${binary ? 'binary' : 'text'} frame`);
+  const foreign = header.type === 'welcome' && header.version !== VERSION;
+  if (!foreign && !fits(header, { fields })) throw new Error(`${header.type} does not consist of what it must`);
   return header as unknown as ServerMessage;
 }
 

@@ -62,7 +62,7 @@ export class ScriptedSocket {
   /** Says why and hangs up. */
   hangUp(message: string, code: number, again: boolean): void {
     this.onopen?.();
-    this.says({ type: 'error', message, fatal: true, again });
+    this.says({ type: 'error', message, fatal: true, again, code: '', values: {} });
     this.drop(code);
   }
 

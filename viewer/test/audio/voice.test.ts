@@ -119,3 +119,40 @@ test('a pause before its first sample puts all of it off', () => {
   expect(paper.sample(voice.schedule.start)).toBe(0);
   expect(paper.sample(voice.schedule.start + PIECE - 1)).toBe(PIECE - 1);
 });
+
+/** The pieces that are played anew when a voice goes on. */
+function replayed(pieces: { first_sample: number; pcm: Int16Array }[]) {
+  const paper = new Paper();
+  const voice = new Voice(0, paper);
+  const expressions = { rows: 0, columns: 0, values: new Float32Array() };
+  for (const each of pieces) voice.add({ utterance: 0, first_expression: 0, expressions, ...each });
+  voice.pause();
+  const played: Int16Array[] = [];
+  const play = paper.play.bind(paper);
+  paper.play = (pcm, start) => {
+    played.push(pcm);
+    return play(pcm, start);
+  };
+  voice.resume();
+  return { voice, paper, played };
+}
+
+test('what goes on after a pause is few long stretches, however short its pieces were', () => {
+  const pieces = Array.from({ length: 300 }, (_, index) => piece(index)); // 45 s
+  const { voice, paper, played } = replayed(pieces);
+  expect(played.map((pcm) => pcm.length / RATE)).toEqual([9.9, 9.9, 9.9, 9.9, 5.4]);
+  expect(played.flatMap((pcm) => [pcm[0]!, pcm.at(-1)!]).slice(0, 3)).toEqual([0, Int16Array.of(66 * PIECE - 1)[0], Int16Array.of(66 * PIECE)[0]]);
+  voice.pause();
+  const before = [...played];
+  voice.resume();
+  expect(played.slice(5)).toEqual(before); // and the same objects, which are ready to be played
+  expect(played.slice(6).every((pcm, index) => pcm === before[index + 1])).toBe(true);
+  expect(paper.sample(voice.schedule.start)).toBe(0);
+});
+
+test('of pieces with gaps between them 64 go on, and nothing is played beyond twenty minutes', () => {
+  const apart = Array.from({ length: 1000 }, (_, index) => ({ first_sample: index * RATE, pcm: new Int16Array(1) }));
+  expect(replayed(apart).played).toHaveLength(64);
+  const late = [0, 1200 * RATE - 1, 1200 * RATE].map((first_sample) => ({ first_sample, pcm: new Int16Array(1) }));
+  expect(replayed(late).played).toHaveLength(2);
+});

@@ -31,8 +31,8 @@ test('gestures and called functions are told as they come', () => {
     type: 'cues',
     utterance: 3,
     cues: [
-      { name: 'wave', mirror: true, begin: 0.5, stroke: 0.9, end: 1.4 },
-      { name: 'nod', mirror: false, begin: 2, stroke: 2.2, end: 2.5 },
+      { number: 0, name: 'wave', mirror: true, begin: 0.5, stroke: 0.9, skip: 0 },
+      { number: 1, name: 'nod', mirror: false, begin: 2, stroke: 2.2, skip: 0 },
     ],
     releases: [],
   });

@@ -65,7 +65,6 @@ def typescript() -> str:
         *(interface(kind, named=True) for kind in messages),
         union("ClientMessage", protocol.CLIENT_MESSAGES),
         union("ServerMessage", protocol.SERVER_MESSAGES),
-        server_types(),
         tensors(messages),
     ]
     return "\n".join(blocks)
@@ -115,12 +114,6 @@ def translated(annotation: Any) -> str:
 def union(name: str, kinds: tuple[type, ...]) -> str:
     """A union type of messages."""
     return f"export type {name} = {' | '.join(map(exported, kinds))};\n"
-
-
-def server_types() -> str:
-    """The list of message names that a page accepts."""
-    names = ", ".join(f'"{kind.__name__.lower()}"' for kind in protocol.SERVER_MESSAGES)
-    return f"export const SERVER_TYPES = [{names}];\n"
 
 
 def tensors(messages: list[type]) -> str:
