@@ -7,7 +7,7 @@ import pytest
 from ico3d.cli import main
 from ico3d.common.catalogue import table as room
 from ico3d.common.catalogue.kinds import FilesPackage, ModelPackage, RemoteFile, Weights
-from ico3d.common.weights import cached, model_file
+from ico3d.common.weights import cached, find_model, model_file
 from ico3d.errors import MissingModelError, SettingsError
 
 
@@ -136,3 +136,13 @@ def test_a_binding_licence_needs_a_yes(capsys, monkeypatch, tmp_path):
         assert status == (0 if says else 1)  # nobody serves there
     assert "cannot be downloaded" in shown.err
     assert not list(Path(tmp_path).rglob("bound.onnx"))
+
+
+def test_a_path_is_no_name_of_a_model(tmp_path, monkeypatch):
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path / "models"))
+    (tmp_path / "models").mkdir()
+    for file in (tmp_path / "outside.onnx", tmp_path / "models" / "inside.onnx"):
+        file.write_bytes(b"")
+    assert find_model("inside.onnx") == tmp_path / "models" / "inside.onnx"
+    for name in (str(tmp_path / "outside.onnx"), "../outside.onnx", "..", ".", "", "./inside.onnx"):
+        assert find_model(name) is None

@@ -112,7 +112,10 @@ def test_impossible_curves_are_refused(times, rotations, why):
 
 @pytest.mark.parametrize(
     "marks",
-    [(0.5, 0.4, 0.5, 0.6, 1), (0.1, 0.2, 0.3, np.nan, 1), (-1, 0, 0, 0, 0), (0, 0, 0, 0.2, 1)],
+    [
+        *((0.5, 0.4, 0.5, 0.6, 1), (0.1, 0.2, 0.3, np.nan, 1), (-1, 0, 0, 0, 0)),
+        *((0, 0, 0, 0.2, 1), (0.1, 0.2, 0.3, 0.4, np.inf), (0.1, 0.2, 0.3, 0.4, 61)),
+    ],
 )
 def test_phases_come_one_after_the_other(marks):
     with pytest.raises(ValueError, match="do not ascend"):

@@ -1,5 +1,7 @@
 """Upper limits for bundles, so that a hostile bundle cannot exhaust memory."""
 
+import re
+
 from ico3d.rig.pose_regression import MOST_KNOWN
 
 MAX_FILES = 256
@@ -34,3 +36,6 @@ MAX_CASTERS = 20_000
 """Spheres that a page draws into a shadow map at every pose."""
 MAX_CAMERA_LENGTH = 1e4
 """Metres; anything farther overflows when a camera is made of it."""
+
+ENCODER, SHA256 = re.compile("[a-z0-9-]{1,40}"), re.compile("[0-9a-f]{64}")
+"""The name of a speech encoder and the hash of its weights, of which a file's name is made."""

@@ -137,8 +137,8 @@ class SpeechInfo:
     """How sound is turned into expressions.
 
     Attributes:
-        encoder: Name of the speech encoder.
-        sha256: SHA-256 of the encoder's weights.
+        encoder: Name of the speech encoder: small letters, digits and hyphens.
+        sha256: SHA-256 of the encoder's weights, 64 hexadecimal digits.
         fps: Expression rows per second (25).
         input: Input of `speech.onnx`: `mel` (windows (T, 80, 16)) or `features` (T, D).
     """
@@ -354,6 +354,13 @@ def _check_speech(manifest: Manifest) -> None:
     _require(driven == (speech is not None), "speech", "be there just for heads driven by speech")
     if speech is not None:
         _require(speech.input in ("mel", "features"), "speech.input", "be mel or features")
+        named = (
+            limits.ENCODER.fullmatch(speech.encoder) is not None
+        )  # a file of this name is opened
+        _require(named, "speech.encoder", "be small letters, digits and hyphens")
+        _require(
+            limits.SHA256.fullmatch(speech.sha256) is not None, "speech.sha256", "have 64 digits"
+        )
         _require(limits.MIN_FPS <= speech.fps <= limits.MAX_FPS, "speech.fps", limits.FPS_RANGE)
         _require(head is None or head.eye_offset == 32, "head.eye_offset", "be 32 for speech")
 

@@ -127,6 +127,8 @@ def check_persona(persona: Persona, where: str) -> None:
         BundleError: At the first invalid entry, which the sentence names.
     """
     _check_lengths(persona, where)
+    short = _letters(persona.name) <= LONGEST_NAME  # a model reads it before each question
+    _require(short, where, "name", f"have at most {LONGEST_NAME} letters")
     _require(len(persona.notes) <= MAX_NOTES, where, "notes", f"be at most {MAX_NOTES}")
     questions = sum(note.partition("=>")[0].count("|") + 1 for note in persona.notes)
     _require(questions <= MAX_NOTES, where, "notes", f"ask at most {MAX_NOTES} questions")

@@ -32,7 +32,12 @@ def model_folders() -> list[Path]:
 
 
 def find_model(name: str) -> Path | None:
-    """Path of a file or folder of this name in `model_folders()`; None where there is none."""
+    """Path of a file or folder of this name in `model_folders()`; None where there is none.
+
+    A path is no name: nothing outside of these folders is found.
+    """
+    if not name or name == ".." or Path(name).name != name:
+        return None
     places = (folder / name for folder in model_folders())
     return next((place for place in places if place.exists()), None)
 

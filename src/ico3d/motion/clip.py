@@ -16,7 +16,7 @@ from safetensors.numpy import save
 from ico3d.common.typed import parse_json
 from ico3d.common.unpacking.heads import bounded_head, load_bounded
 from ico3d.errors import SettingsError
-from ico3d.motion.curves import TOLERANCE, Curve, packed, reduced, unpacked
+from ico3d.motion.curves import LONGEST, TOLERANCE, Curve, packed, reduced, unpacked
 from ico3d.motion.roles import INDEX, ROLES, SIDES, mirrored_role
 from ico3d.motion.turning import mirrored
 from ico3d.rig.quaternions import Array, continuous
@@ -68,12 +68,13 @@ class Marks:
         """Checks the order.
 
         Raises:
-            ValueError: If a phase ends before it begins, or the stroke arrives at time 0.
+            ValueError: If a phase ends before it begins, the stroke arrives at time 0, or the end
+                after `LONGEST` seconds.
         """
         order = (0.0, self.ready, self.stroke, self.hold, self.release, self.end)
         ascend = all(a <= b for a, b in pairwise(order))  # not where one is NaN
-        if not ascend or self.stroke == 0:
-            raise ValueError("a clip's marks do not ascend")
+        if not ascend or self.stroke == 0 or self.end > LONGEST:
+            raise ValueError(f"a clip's marks do not ascend, to {LONGEST:g} s at most")
 
 
 @dataclass(frozen=True, eq=False)

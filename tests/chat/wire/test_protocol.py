@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ico3d.chat.conversation import Conversation
-from ico3d.chat.generating import fields, reference, shared, typescript
+from ico3d.chat.generating import reference, server_fields, shared, typescript
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import (
     OversizedError,
@@ -195,7 +195,7 @@ def test_every_message_of_a_page_has_a_handler():
     ("target", "made"),
     [
         (typescript.TARGET, typescript.typescript),
-        (fields.TARGET, fields.typescript),
+        (server_fields.TARGET, server_fields.typescript),
         (shared.TARGET, shared.typescript),
         (reference.TARGET, reference.markdown),
     ],

@@ -1,10 +1,10 @@
 """Writes all files that are generated from the messages: `python -m ico3d.chat.generating`."""
 
-from ico3d.chat.generating import fields, reference, shared, typescript
+from ico3d.chat.generating import reference, server_fields, shared, typescript
 
 for target, text in (
     (typescript.TARGET, typescript.typescript()),
-    (fields.TARGET, fields.typescript()),
+    (server_fields.TARGET, server_fields.typescript()),
     (shared.TARGET, shared.typescript()),
     (reference.TARGET, reference.markdown()),
 ):

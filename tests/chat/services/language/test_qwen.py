@@ -69,6 +69,41 @@ async def test_an_interruption_stops_the_generation(bundle, endless):
         await page.close()
 
 
+class Letters:
+    """A tokenizer whose tokens are letters."""
+
+    def encode(self, text, add_special_tokens):
+        assert not add_special_tokens
+        return list(text)
+
+    def decode(self, tokens):
+        return "".join(tokens)
+
+
+def test_what_a_model_reads_is_counted_in_tokens():
+    """Nobody can stop it while it reads."""
+    from ico3d.chat.services.language.in_process import (
+        LONGEST_MESSAGE,
+        MOST_TALK,
+        MOST_TOLD,
+        Loaded,
+    )
+
+    talk = [{"role": role, "content": letter * 2000} for role, letter in TALK]
+    told = {"role": "system", "content": "!" * 500_000}
+    kept = Loaded("x", None, Letters())._fitting([told, *talk])
+    assert [(one["role"], one["content"][0], len(one["content"])) for one in kept] == [
+        ("system", "!", MOST_TOLD),
+        *((role, letter, LONGEST_MESSAGE) for role, letter in TALK[-3:]),
+    ]
+    assert MOST_TALK == 4 * LONGEST_MESSAGE  # the answer before these has no question before it
+    short = [told | {"content": "Be kind."}, *({"role": r, "content": c} for r, c in TALK)]
+    assert Loaded("x", None, Letters())._fitting(short) == short
+
+
+TALK = [("user", "a"), ("assistant", "b"), ("user", "c"), ("assistant", "d"), ("user", "e")]
+
+
 def counted(model):
     """Grows by one with each token that a model makes."""
     made = []

@@ -8,7 +8,7 @@ import asyncio
 import functools
 import re
 import threading
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +16,8 @@ from typing import Any
 
 import ctranslate2
 from tokenizers import Tokenizer
+
+from ico3d.chat.services.language.fitting import fitting
 
 AT_ONCE = 2  # answers generated side by side; further ones wait
 BEGIN, END = "<|im_start|>", "<|im_end|>"
@@ -112,6 +114,10 @@ class SmallModel:
         """The text of tokens."""
         return self.tokenizer.decode([token.number for token in tokens])
 
+    def fitting(self, texts: Iterable[tuple[str, int]], most: int) -> list[str]:
+        """The first of some texts, each cut, within so many tokens in all (`fitting`)."""
+        return fitting(texts, most, lambda text: self._encoded(text).ids, self.tokenizer.decode)
+
     def _generate(
         self, before: Sequence[Turn], turns: Sequence[Turn], most: int, tell: Any
     ) -> None:
@@ -133,7 +139,10 @@ class SmallModel:
             tell(None)  # or its reader waits for ever
 
     def _tokens_of(self, text: str) -> list[str]:
-        return self.tokenizer.encode(text).tokens
+        return self._encoded(text).tokens
+
+    def _encoded(self, text: str) -> Any:
+        return self.tokenizer.encode(text)
 
 
 def prompt(turns: Sequence[Turn]) -> str:
@@ -142,8 +151,10 @@ def prompt(turns: Sequence[Turn]) -> str:
 
 
 def plain(text: str) -> str:
-    """A text without marks that would begin or end a turn."""
-    return text.replace(BEGIN, "").replace(END, "").strip()
+    """A text without marks that would begin or end a turn, not even out of parts of marks."""
+    while (rest := text.replace(BEGIN, "").replace(END, "")) != text:
+        text = rest
+    return text.strip()
 
 
 def confidence(tokens: Sequence[Token]) -> float:

@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import aclosing
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 from pipecat.frames.frames import (
@@ -34,6 +34,7 @@ from transformers import (
 from transformers.utils.import_utils import is_torch_cuda_available
 
 from ico3d.chat.pipecat_internals import check_schema, push_text, settings_of
+from ico3d.chat.services.language.fitting import fitting
 from ico3d.chat.services.language.reasoning import (
     Parts,
     Thoughts,
@@ -42,6 +43,8 @@ from ico3d.chat.services.language.reasoning import (
 )
 
 AT_ONCE = 2  # answers generated side by side; further ones wait
+MOST_TOLD, MOST_TALK, LONGEST_MESSAGE = 3072, 1024, 256
+"""Tokens that a model reads of its instruction, of the conversation, and of one message."""
 _loading = threading.Lock()
 
 
@@ -122,13 +125,31 @@ class Loaded:
     ) -> None:
         try:
             prompt = self.tokenizer.apply_chat_template(
-                messages, add_generation_prompt=True, return_tensors="pt", return_dict=True
+                self._fitting(messages),
+                add_generation_prompt=True,
+                return_tensors="pt",
+                return_dict=True,
             ).to(self.model.device)
             criteria = StoppingCriteriaList([stop])
             self.model.generate(**prompt, **how, streamer=streamer, stopping_criteria=criteria)
         except BaseException:
             streamer.on_finalized_text("", stream_end=True)  # or its reader waits for ever
             raise
+
+    def _fitting(self, messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """The instruction and the newest messages within the tokens that the model reads.
+
+        What is left of a conversation begins with the visitor, as some models' templates demand.
+        """
+        told = [message for message in messages if message["role"] == "system"]
+        talk = [message for message in reversed(messages) if message["role"] != "system"]
+        how = (partial(self.tokenizer.encode, add_special_tokens=False), self.tokenizer.decode)
+        begin = fitting(((str(one["content"]), MOST_TOLD) for one in told), MOST_TOLD, *how)
+        said = fitting(((str(one["content"]), LONGEST_MESSAGE) for one in talk), MOST_TALK, *how)
+        while 1 < len(said) < len(talk) and talk[len(said) - 1]["role"] != "user":
+            said.pop()
+        kept = [*zip(told, begin, strict=False), *reversed([*zip(talk, said, strict=False)])]
+        return [message | {"content": text} for message, text in kept]
 
 
 def chosen(most: int, temperature: float | None) -> dict[str, Any]:

@@ -5,7 +5,7 @@ the nearest notes before its eyes, as far as it is sure; of everything else the 
 persona does not know.
 """
 
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable, Iterable
 from contextlib import aclosing
 from dataclasses import dataclass
 
@@ -22,6 +22,9 @@ WEIGHTS = "smollm2-135m"
 PACKAGES = ("ctranslate2", "tokenizers")
 NEAREST, NEAR = 2, 0.3  # notes before the model's eyes, and the least score of their match
 REMEMBERED = 4  # messages of the conversation before the question
+LONGEST_QUESTION, LONGEST_TURN = 128, 64  # tokens
+MOST_TOKENS = LONGEST_QUESTION + 2 * NEAREST * LONGEST_TURN
+"""Tokens that the model reads of notes, conversation and question: a second of one core."""
 EXAMPLES = (
     ("user", "What did I eat today?"),
     ("assistant", "I do not know that. You have not told me."),
@@ -33,6 +36,11 @@ EXAMPLES = (
     ("assistant", "I do not know that. I have no clock."),
 )
 """Turns that show the model how to answer; it follows examples better than instructions."""
+
+Turn = tuple[str, str]
+"""Who said something, and what."""
+Fitting = Callable[[Iterable[tuple[str, int]], int], list[str]]
+"""Cuts texts, each to its number of tokens, and drops the last of them beyond a number in all."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     for name in PACKAGES:
         if lacks_package(name, "natural"):
             raise MissingExtraError(name, "natural", "the language model SmolLM2")
-    from ico3d.chat.services.language.ctranslate import SmallModel, Turn, load
+    from ico3d.chat.services.language.ctranslate import SmallModel, load
 
     class NotedModel(PersonaModel):
         """Answers from the notes, else by the model as far as it is sure."""
@@ -95,7 +103,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
             if known or not question:
                 return
             told = False
-            turns = [*shown(self._notes, question), *recent(context)]
+            turns = fitted(shown(self._notes, question), recent(context), self._model.fitting)
             most, sure = settings.max_tokens, settings.sure
             async with aclosing(self._model.sentences(self._begin, turns, most, sure)) as said:
                 async for sentence in said:
@@ -115,7 +123,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     return NotedModel(notes, load(model_of(WEIGHTS)), beginning(context.persona.name))
 
 
-def beginning(name: str) -> list[tuple[str, str]]:
+def beginning(name: str) -> list[Turn]:
     """The turns with which each prompt begins: who the model is, and how it answers."""
     told = (
         f"You are {name}, a friendly virtual person who talks with a visitor. "
@@ -124,7 +132,7 @@ def beginning(name: str) -> list[tuple[str, str]]:
     return [("system", told), *EXAMPLES]
 
 
-def shown(notes: Notes, question: str) -> list[tuple[str, str]]:
+def shown(notes: Notes, question: str) -> list[Turn]:
     """The notes that are nearest to a question, as turns of the conversation, the nearest last."""
     near = [note for note, score in notes.nearest(question, NEAREST) if score >= NEAR]
     return [
@@ -134,9 +142,27 @@ def shown(notes: Notes, question: str) -> list[tuple[str, str]]:
     ]
 
 
-def recent(context: LLMContext) -> list[tuple[str, str]]:
+def fitted(notes: list[Turn], talk: list[Turn], fitting: Fitting) -> list[Turn]:
+    """Notes, then the last turns of a conversation, as far as the model's tokens suffice.
+
+    Args:
+        notes: The notes that are shown, as turns.
+        talk: The last turns, the question at the end.
+        fitting: Cuts texts and drops the last of them (`SmallModel.fitting`).
+    """
+    *before, question = talk
+    worth = [question, *notes, *reversed(before)]  # the longest in the conversation ago goes first
+    longest = [LONGEST_QUESTION, *(LONGEST_TURN for _ in worth[1:])]
+    texts = fitting(
+        ((text, most) for (_, text), most in zip(worth, longest, strict=True)), MOST_TOKENS
+    )
+    asked, *others = ((role, text) for (role, _), text in zip(worth, texts, strict=False))
+    return [*others[: len(notes)], *reversed(others[len(notes) :]), asked]
+
+
+def recent(context: LLMContext) -> list[Turn]:
     """The last turns of the conversation, the question included."""
-    spoken: list[tuple[str, str]] = []
+    spoken: list[Turn] = []
     for message in context.get_messages():
         role = message.get("role") if isinstance(message, dict) else None
         content = message.get("content") if isinstance(message, dict) else None

@@ -1,4 +1,4 @@
-"""Generates `viewer/src/talk/line/fields.ts` from `protocol.py`: what messages of a server consist of.
+"""Generates `viewer/src/talk/line/fields.ts` from `protocol.py`: what a server's messages are of.
 
 Whoever answers a page may send anything, so the page looks before it takes a text for a number.
 """
