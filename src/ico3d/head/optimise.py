@@ -18,6 +18,7 @@ from ico3d.head.learning_rows import LearningRows
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.portrait.shoulders import shoulders_of
+from ico3d.head.portrait.sight import SHORTENED_EVERY, sight_of
 from ico3d.head.settings import SGD_GAINS, HeadSettings
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
@@ -93,6 +94,7 @@ class HeadTrainer:
         self._turns = self._turn_values(frames)
         self._rows = LearningRows(model.shape, track, frames, settings.even_rows)
         self._shoulders = shoulders_of(capture, model.shape.neck, self.pictures)
+        self._sight = sight_of(self.views) if settings.shared_depth else None
         self._close_ups = CloseUps(capture, self.views if settings.close_ups else [], seed)
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
@@ -268,13 +270,25 @@ class HeadTrainer:
         weights = self.model.row_weights(expression)
         assert features.grad is not None
         self._update_basis(weights, features.grad, rates["basis"])
+        before = self.model.means.detach().clone()  # (N, 3)
         for name, parameter in self.model.named_parameters():
             if parameter.grad is not None:
                 rate = rates[name if name in GEOMETRY else "mlp"]
                 self._optimiser.update(name, parameter, parameter.grad, rate)
                 parameter.grad = None
+        self._keep_together(before, index)
         bound_scales(self.model)
         self._update_adaptor(rates["adaptor"])
+
+    @torch.no_grad()
+    def _keep_together(self, before: Tensor, index: int) -> None:
+        """What a step may not do along the line of sight, if the head is seen from one side."""
+        model = self.model
+        if self._sight is None:
+            return
+        model.means.data = self._sight.together(model.means.data, before)
+        if index % SHORTENED_EVERY == 0:
+            model.log_scales.data = self._sight.shortened(model.log_scales.data, model.quats.data)
 
     def look_closer(self, close_up: CloseUp, index: int) -> None:
         """One step on the basis of the Gaussians that a close-up shows, and on nothing else."""

@@ -180,6 +180,8 @@ class HeadSettings:
             Not in the paper.
         displacements: Most ways in which Gaussians move with the expression, as the face's
             landmarks do; 0 for Gaussians that stand still, as in the paper.
+        shared_depth: Keep neighbouring Gaussians together along the line of sight, and none longer
+            there than wide, where all pictures show the head from about one side. Not in the paper.
         smile: Let a head that speech drives also be told how much the person smiles, so that its
             avatar smiles when it is glad; for recordings with blendshapes. Not in the paper.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
@@ -206,6 +208,7 @@ class HeadSettings:
     even_rows: bool = False
     close_ups: int = 0
     displacements: int = 0
+    shared_depth: bool = False
     smile: bool = False
     sh_degree: int = 0
     sh_every: int = 1_000
@@ -230,6 +233,7 @@ PRESETS: dict[PresetName, HeadSettings] = {
         basis_optimiser="rmsprop",
         even_rows=True,
         close_ups=4,
+        shared_depth=True,
         loss=Loss(perceptual=0.0, torso=0.5, alpha=0.1, squares=8.0),
         rates=Rates(
             position=2.5e-3,
