@@ -81,6 +81,10 @@ def test_moods_of_gestures_are_known():
     assert set(WITH_GESTURES) <= lexicon().gestures
 
 
-def test_lids_never_move():
+def test_eyes_narrow_in_a_smile_and_no_mood_shuts_them():
     lids = [FACE_NAMES.index(name) for name in ("eyeBlinkLeft", "eyeBlinkRight")]
-    assert all(not face_of(name)[lids].any() for name in FACES) and not face_of("neutral").any()
+    narrowed = {name: face_of(name)[lids].tolist() for name in FACES}
+    assert all(left == right <= 0.3 for left, right in narrowed.values())
+    assert [name for name, values in narrowed.items() if any(values)] == ["happy"]
+    assert not face_of("neutral").any()
+

@@ -23,6 +23,7 @@ export class Face implements Director {
   private changedAt = -Infinity;
   private readonly from: Float32Array;
   private readonly target: Float32Array;
+  private readonly awake: Float32Array; // without blinks
   private readonly shown: Float32Array;
 
   /**
@@ -35,7 +36,9 @@ export class Face implements Director {
     this.clock = clock;
     this.from = new Float32Array(size);
     this.target = new Float32Array(size);
+    this.awake = new Float32Array(size);
     this.shown = new Float32Array(size);
+    idle.rest(this.awake);
     idle.at(clock(), this.shown);
   }
 
@@ -47,12 +50,13 @@ export class Face implements Director {
     if (source !== this.source) {
       this.source = source;
       this.changedAt = now;
-      this.from.set(this.shown);
+      this.from.set(this.awake);
     }
     if (heard) heard.track.at(heard.seconds + DISPLAY_LEAD, this.target);
-    else this.idle.at(now, this.target);
-    mix(this.from, this.target, smooth((now - this.changedAt) / EASE), this.shown);
-    this.idle.setLids(now, this.shown); // those of the speech would blink beside those at rest
+    else this.idle.rest(this.target);
+    mix(this.from, this.target, smooth((now - this.changedAt) / EASE), this.awake);
+    this.shown.set(this.awake);
+    this.idle.blinks(now, this.shown);
     const changed = this.shown.some((value, i) => value !== out[i]);
     out.set(this.shown);
     return changed;

@@ -2,6 +2,9 @@ import { BLINK } from '../shared.ts';
 
 const LENGTH = BLINK.closing + BLINK.closed + BLINK.opening; // s
 
+/** How much of the way to closed a face may narrow its eyes by itself, as in a smile. */
+const NARROWEST = 0.3;
+
 /** The resting face: the neutral expression, and lids that blink at rest and in speech. */
 export class IdleFace {
   private readonly neutral: Float32Array;
@@ -21,19 +24,28 @@ export class IdleFace {
 
   /** The expression at rest. */
   at(seconds: number, out: Float32Array): void {
+    this.rest(out);
+    this.blinks(seconds, out);
+  }
+
+  /** The expression at rest, between two blinks. */
+  rest(out: Float32Array): void {
     out.set(this.neutral);
-    this.setLids(seconds, out);
   }
 
   /**
-   * Puts the lids into any expression: one series of blinks, whatever the face does besides.
+   * Lets the lids of any expression blink: one series, whatever the face does besides, from open or narrowed eyes.
    *
    * @param seconds of a clock that only runs forward
    */
-  setLids(seconds: number, out: Float32Array): void {
+  blinks(seconds: number, out: Float32Array): void {
     while (seconds > this.blink + LENGTH) this.blink += this.pause();
     const closed = lidClosure(seconds - this.blink);
-    for (const i of this.lids) out[i] = this.neutral[i]! + (1 - this.neutral[i]!) * closed;
+    for (const i of this.lids) {
+      const open = this.neutral[i]!;
+      const narrowed = Math.min(Math.max(out[i]!, open), open + NARROWEST * (1 - open));
+      out[i] = narrowed + (1 - narrowed) * closed;
+    }
   }
 
   /** Seconds from one blink to the next: log-normal, within bounds. */

@@ -83,7 +83,7 @@ test('one series of blinks runs through rest, speech and rest again', () => {
   const face = new Face(2, new IdleFace(neutral, [0], draw), () => heard, () => now);
   const twin = new IdleFace(neutral, [0], draw);
   const track = new ExpressionTrack(FPS);
-  track.add(0, matrix([0.9, 1], [0.2, 1]));
+  track.add(0, matrix([0.1, 1], [0.1, 1]));
   const [shown, alone] = [new Float32Array(2), new Float32Array(2)];
   const blinks: [number, boolean][] = [];
   let spoken = false;
@@ -124,6 +124,19 @@ describe('a resting face', () => {
     expect(most).toBeCloseTo(1, 5);
     expect(starts.length).toBeGreaterThan(5);
     for (let i = 1; i < starts.length; i++) expect(starts[i]! - starts[i - 1]!).toBeGreaterThan(2);
+  });
+
+  test('blinks from the eyes that a smile has narrowed, which are never nearly shut', () => {
+    const idle = new IdleFace(Float32Array.of(0.1), [0], () => 0.5); // the first blink begins after a second
+    const lid = (driven: number, seconds: number) => {
+      const out = Float32Array.of(driven);
+      idle.blinks(seconds, out);
+      return out[0]!;
+    };
+    expect([-1, 0, 0.1].map((driven) => lid(driven, 0))).toEqual([0.1, 0.1, 0.1].map(Math.fround));
+    expect(lid(0.25, 0)).toBe(Math.fround(0.25));
+    expect(lid(0.9, 0)).toBeCloseTo(0.1 + 0.3 * 0.9);
+    expect(lid(0.25, 1.08)).toBeCloseTo(1);
   });
 
   test('closes faster than it opens', () => {

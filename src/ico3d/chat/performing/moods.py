@@ -12,7 +12,14 @@ EASE = 0.4
 """Seconds of the transition between two moods."""
 FACES: dict[str, dict[str, float]] = {
     NEUTRAL: {},
-    "happy": {"browInnerUp": 0.15, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3, "smile": 1.0},
+    "happy": {
+        "browInnerUp": 0.15,
+        "browOuterUpLeft": 0.3,
+        "browOuterUpRight": 0.3,
+        "eyeBlinkLeft": 0.16,  # cheeks that a smile raises narrow the eyes
+        "eyeBlinkRight": 0.16,
+        "smile": 1.0,
+    },
     "surprised": {
         "browInnerUp": 0.6,
         "browOuterUpLeft": 0.6,
