@@ -192,6 +192,22 @@ def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):
     assert first == 9 / 12
 
 
+def test_what_an_earlier_version_began_is_learnt_anew(tracked, settings, monkeypatch):
+    def stop_at(event):
+        if isinstance(event, Preview):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        create(settings, stop_at)
+    newer = Quality("exact", 22, True, replace(HEAD, steps=13))
+    monkeypatch.setitem(QUALITIES, settings.quality, newer)
+    told = []
+    create(settings, told.append)
+    assert len(tracked) == 1  # its tracking counts
+    assert next(e.share for e in told if isinstance(e, Advanced) and e.step == "learn") == 1 / 13
+    assert settings.out.is_file()
+
+
 def test_a_video_of_which_nothing_can_be_made(tracked, settings, monkeypatch, capfd):
     worse = Examination(30.0, 25.0, 512**2, (Advice("face-none", "refused"),), True)
     monkeypatch.setattr(room, "examine", lambda *_: worse)

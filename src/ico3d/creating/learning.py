@@ -1,5 +1,6 @@
 """Trains the head, and shows it while it learns."""
 
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -17,6 +18,7 @@ from ico3d.head.optimise import HeadTrainer
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.training.loop import Watch
+from ico3d.training.run import goes_on
 
 TOLD, SHOWN = 100, 12
 """Number of times that progress is told, and that the face is shown."""
@@ -27,12 +29,16 @@ def learn(
 ) -> TrainedHead:
     """Trains the head, or goes on with it; at once if it is trained.
 
+    What was learnt in another way, as by an earlier version of ico3d, is learnt anew.
+
     Raises:
         CaptureError: If the capture lacks something that the training needs.
         ModelError: If training diverges.
         StorageError: If the disk is full.
     """
     job = HeadJob("speech", "full", "builtin", 0, quality.head)
+    if not goes_on(folder, job.about(capture.path)):
+        shutil.rmtree(folder)
     watched = partial(_shown, steps=quality.head.steps, tell=tell)
     return train_head(capture, folder, job, watched, settings.device)
 

@@ -77,7 +77,7 @@ class Quality:
     head: HeadSettings
 
 
-_CPU = PRESETS["cpu"]
+_CPU = replace(PRESETS["cpu"], smile=True)
 QUALITIES: dict[QualityName, Quality] = {
     "quick": Quality(
         "rough",

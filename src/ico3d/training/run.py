@@ -4,6 +4,7 @@ import json
 import logging
 from collections.abc import Mapping, Set
 from pathlib import Path
+from typing import Any
 
 from torch import Tensor
 
@@ -27,6 +28,26 @@ NESTED = "settings"
 
 FREE = ("cache_gib", "cache_dir")
 """Settings that a resumed run may have otherwise: they change no result."""
+
+
+def goes_on(path: Path, settings: Mapping) -> bool:
+    """Whether a folder holds no run, or one that goes on with these settings.
+
+    Raises:
+        ModelError: If the folder's settings are damaged.
+    """
+    file = path / SETTINGS
+    return not file.exists() or not _differences(_read(file), json.loads(json.dumps(settings)))
+
+
+def _differences(earlier: Mapping, now: Mapping) -> dict[str, tuple[Any, Any]]:
+    """Settings of two runs that differ, by name, but for those in `FREE`."""
+    one, other = _flat(earlier), _flat(now)
+    return {
+        name: (one.get(name), other.get(name))
+        for name in sorted({*one, *other})
+        if name.rpartition(".")[2] not in FREE and one.get(name) != other.get(name)
+    }
 
 
 class RunFolder:
@@ -69,14 +90,11 @@ class RunFolder:
                 f"{self.path} holds a run that an earlier version of ico3d began, whose settings "
                 "had other names: choose another folder, or remove it to start afresh."
             )
-        before, now = _flat(earlier), _flat(self.settings)
-        for name in sorted({*before, *now}):
-            free = name.rpartition(".")[2] in FREE
-            if not free and before.get(name) != now.get(name):
-                raise SettingsError(
-                    f"{self.path} holds a run with another '{name}' ({before.get(name)}, not "
-                    f"{now.get(name)}): choose another folder, or remove it to start afresh."
-                )
+        for name, (before, now) in _differences(earlier, self.settings).items():
+            raise SettingsError(
+                f"{self.path} holds a run with another '{name}' ({before}, not {now}): choose "
+                "another folder, or remove it to start afresh."
+            )
 
     def checkpoint(self, names: Set[str] = frozenset()) -> tuple[dict[str, Tensor], dict] | None:
         """Tensors and state of the latest checkpoint that can be used, or None before the first.

@@ -87,4 +87,3 @@ def test_eyes_narrow_in_a_smile_and_no_mood_shuts_them():
     assert all(left == right <= 0.3 for left, right in narrowed.values())
     assert [name for name, values in narrowed.items() if any(values)] == ["happy"]
     assert not face_of("neutral").any()
-
