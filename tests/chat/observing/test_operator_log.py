@@ -202,6 +202,15 @@ def test_lines_that_repeat_themselves_are_counted(log):
     assert records(file)[2:] == ["ERROR: the same (999 more of these since)"]
 
 
+def test_a_terminal_obeys_nothing_and_a_message_is_one_line():
+    """Another server's words may stand in a message of our own."""
+    file = io.StringIO()
+    OperatorLog(file).write("ERROR", "it said \x1b[2J\x07 \u202e\nFAKE: all is well, Zoë")
+    line = file.getvalue()
+    assert line.endswith("it said \\x1b[2J\\x07 \\u202e\\nFAKE: all is well, Zoë\n")
+    assert line.count("\n") == 1
+
+
 def test_source_that_is_not_there_says_nothing():
     assert constant_part("/nowhere/at_all.py", 3) == ""
 

@@ -106,6 +106,18 @@ async def test_a_server_that_failed_is_left_alone_for_a_while(bundle, model, sha
         made.close()
 
 
+async def test_a_server_that_is_slower_than_speech_is_left(bundle, model, sha256, sound):
+    """Each answer comes within its time; all together they are too late."""
+    async with serving(expression_app(bundle)) as url:
+        for each, left in ((0.4, True), (0.01, False)):  # s from one look at the clock to the next
+            clock = itertools.count(0.0, each)
+            made = mouth(url, model, sha256, now=lambda clock=clock: next(clock))
+            rows, lips = await asyncio.to_thread(remote, made, sound)
+            assert (lips._own is not None) == left
+            np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+            made.close()
+
+
 async def test_an_interrupted_sentence_does_not_disturb_the_next(bundle, model, sha256, sound):
     async with serving(expression_app(bundle)) as url:
         made = mouth(url, model, sha256)

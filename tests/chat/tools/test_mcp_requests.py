@@ -145,3 +145,5 @@ def test_what_breaks_the_protocol_is_said_in_a_few_words():
         ListToolsResult.model_validate({"tools": [{}] * 5000})
     said = Connection(McpServer("clock", url="http://127.0.0.1:1/mcp")).told(caught.value)
     assert said == "it does not keep to the protocol"
+    told = Connection(McpServer("clock", url="http://127.0.0.1:1/mcp")).told
+    assert told(OSError("\x1b[2J well\n\u202e.")) == r"\x1b[2J well \u202e"

@@ -20,10 +20,10 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, TextIO
 
 from ico3d.chat.observing.failures import cause
-from ico3d.errors import MissingExtraError, SettingsError
+from ico3d.errors import MissingExtraError, SettingsError, printable
 
 if TYPE_CHECKING:
-    from loguru import Message
+    from loguru import Message, Record
 
 OWN = "ico3d."
 TOLD = (  # places where pipecat logs the errors of processors, of which `metrics.py` tells
@@ -86,9 +86,12 @@ class OperatorLog:
 
 
 def as_text(level: str, line: str, more: int) -> str:
-    """A line of the log for people; `more` is how often it was left out before."""
+    """A line of the log for people; `more` is how often it was left out before.
+
+    A terminal obeys nothing in it, and it is one line: parts of it may come from other servers.
+    """
     again = f" ({more} more of these since)" if more else ""
-    return f"{time.strftime('%H:%M:%S')} {level}: {line}{again}"
+    return f"{time.strftime('%H:%M:%S')} {level}: {printable(line)}{again}"
 
 
 def as_object(level: str, line: str, more: int) -> str:
@@ -133,12 +136,17 @@ def set_up_log(verbose: bool, as_json: bool = False) -> None:
         raise MissingExtraError("pipecat-ai", "chat", "talking with an avatar") from None
     logger.remove()
     if verbose:
+        logger.configure(patcher=_make_printable)
         logger.add(sys.stderr, level="DEBUG")
         logging.basicConfig(level=logging.INFO)
         return
     log = OperatorLog(as_json=as_json)
     logger.add(log.take, level="WARNING", format="{message}")
     logging.getLogger().addHandler(StandardHandler(log))
+
+
+def _make_printable(record: "Record") -> None:
+    record["message"] = printable(record["message"])
 
 
 def constant_part(path: str, line: int) -> str:

@@ -11,6 +11,7 @@ from loguru import logger
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+from ico3d.chat.observing.failures import cause
 from ico3d.chat.settings.conversation import Expression
 from ico3d.chat.settings.keys import key_for
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
@@ -22,6 +23,7 @@ from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
 AVOIDED = 20.0  # s for which a server that failed is not asked again
+MOST_BEHIND = 1.0  # s that its answers may take longer than the sound: it is made two seconds ahead
 ROW_SAMPLES = SPEECH_RATE // EXPRESSION_FPS
 SPARE_ROWS = 8
 """Rows that an answer may have beyond the sound: a very short sound has six."""
@@ -52,6 +54,7 @@ class RemoteMouth:
         self._lock = threading.Lock()  # a sentence that was interrupted may still be under way
         self._socket: ClientConnection | None = None
         self._sentence = 0
+        self._behind = 0.0  # s
         self._avoided_until = float("-inf")
 
     def lips(self) -> "RemoteLips":
@@ -81,17 +84,31 @@ class RemoteMouth:
             if self._now() < self._avoided_until:
                 raise ServiceError("it failed a moment ago.")
             try:
-                return self._exchange(message, is_first, fitting)
+                begun = self._now()
+                rows = self._exchange(message, is_first, fitting)
+                self._keep_up(self._now() - begun, len(rows) / EXPRESSION_FPS)
+                return rows
             except FAILURES as error:
                 self._avoided_until = self._now() + AVOIDED
                 self._hang_up()
-                logger.error(f"remote expression failed, the own model goes on: {error}")
+                logger.error(f"remote expression failed, the own model goes on: {cause(error)}")
                 raise
 
     def close(self) -> None:
         """Closes the connection."""
         with self._lock:
             self._hang_up()
+
+    def _keep_up(self, took: float, gave: float) -> None:
+        """Counts by how many seconds answers fall behind the sound that they are for.
+
+        Raises:
+            ServiceError: If it is too many: then speech would stutter, though each came in time.
+        """
+        self._behind = max(0.0, self._behind + took - gave)
+        if self._behind > MOST_BEHIND:
+            self._behind = 0.0
+            raise ServiceError("its answers take longer than the sound.")
 
     def _exchange(self, message: bytes | str, is_first: bool, fitting: range) -> np.ndarray:
         line = self._socket or self._connected()

@@ -22,7 +22,7 @@ from ico3d.chat.settings.headers import blanked, filled_in
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools.http import MOST_BYTES
 from ico3d.chat.wire.characters import sendable
-from ico3d.errors import Ico3dError
+from ico3d.errors import Ico3dError, printable
 
 if TYPE_CHECKING:
     from mcp import Client
@@ -141,7 +141,7 @@ class Connection:
             error = error.exceptions[0]
         if isinstance(error, ValidationError):  # in full it may have millions of letters
             return "it does not keep to the protocol"
-        said = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+        said = printable(" ".join(str(error).split())).rstrip(".") or type(error).__name__
         return blanked(said, self.server.secrets, self.server.where)[:LONGEST_COMPLAINT]
 
     def _function(self, tool: "Tool") -> FunctionSchema:
