@@ -78,6 +78,28 @@ def test_read_notices_a_change_after_opening(bundle_folder):
         bundle.read("thumbnail.png")
 
 
+def test_what_is_put_in_the_place_of_an_open_bundle_is_not_read(bundle_path, tmp_path):
+    """Servers that share a bundle are updated one after another; nobody has checked the new one."""
+    bundle = Bundle.open(bundle_path)
+    before = bundle.read("thumbnail.png")
+    other = tmp_path / "other.zip"
+    with zipfile.ZipFile(other, "w") as archive:
+        for number in range(3000):
+            archive.writestr(f"thumbnail.png{number}", b"")
+    other.replace(bundle_path)
+    assert bundle.read("thumbnail.png") == before
+    with pytest.raises(BundleError, match="holds more than 256 files"):
+        Bundle.open(bundle_path)
+
+
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(bundle_folder):
+    bundle = Bundle.open(bundle_folder)
+    (bundle_folder / "thumbnail.png").unlink()
+    os.mkfifo(bundle_folder / "thumbnail.png")
+    with pytest.raises(BundleError, match=r"thumbnail\.png"):
+        bundle.read("thumbnail.png")
+
+
 @pytest.mark.parametrize(
     "name", ["head.safetensors", "head_poses.safetensors", "speech.onnx", "thumbnail.png"]
 )

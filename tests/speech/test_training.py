@@ -74,6 +74,17 @@ def test_lag_is_positive_when_late():
     assert training._lag_ms(smooth, smooth) == pytest.approx(0, abs=2)
 
 
+def test_what_a_link_leads_to_is_left_as_it_is(tmp_path):
+    diary = tmp_path / "diary.txt"
+    diary.write_text("Dear diary\n")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "metrics.jsonl").symlink_to(diary)
+    command = f"train speech {tmp_path / 'out'} --steps 1 --batch 1 --test-batches 1"
+    assert main(command.split()) == 0
+    assert diary.read_text() == "Dear diary\n"
+    assert len((tmp_path / "out" / "metrics.jsonl").read_text().splitlines()) == 1
+
+
 def test_the_command_writes_an_encoder_and_its_card(tmp_path):
     command = f"train speech {tmp_path} --steps 2 --batch 2 --test-batches 2"
     assert main(command.split()) == 0

@@ -5,7 +5,10 @@ import os
 import re
 import stat
 import struct
+import threading
+import weakref
 import zipfile
+import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
@@ -17,6 +20,8 @@ from ico3d.common.unpacking.zips import OtherEndError, directory
 from ico3d.errors import BundleError
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}(/[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}){0,3}")
+LOCAL_HEAD = struct.Struct("<26xHH")
+"""What stands before a file in a zip, of which the lengths of name and extra fields count."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -91,6 +96,7 @@ class _Folder(Archive):
 
     def read(self, name: str) -> bytes:
         flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+        flags |= getattr(os, "O_NONBLOCK", 0)  # a pipe in its place would be waited for
         try:
             with open(os.open(self.path / name, flags), "rb") as file:
                 data = file.read(self.sizes[name] + 1)
@@ -101,25 +107,36 @@ class _Folder(Archive):
 
 class _Zip(Archive):
     def __init__(self, path: Path):
-        self.path = path
-        with _reading(path.name), path.open("rb") as file:
-            _check_directory(file, path)
-            with zipfile.ZipFile(file) as archive:
-                self.entries = archive.infolist()
-        _check_names([entry.orig_filename for entry in self.entries], path)
-        for entry in self.entries:
+        with _reading(path.name):
+            # kept open: what somebody puts in its place is another bundle, which nobody has checked
+            self._file, self._lock = path.open("rb"), threading.Lock()
+            weakref.finalize(self, self._file.close)
+            _check_directory(self._file, path)
+            with zipfile.ZipFile(self._file) as archive:
+                entries = archive.infolist()
+        _check_names([entry.orig_filename for entry in entries], path)
+        for entry in entries:
             _check_entry(entry)
-        self.sizes = {entry.filename: entry.file_size for entry in self.entries}
+        self._entries = {entry.filename: entry for entry in entries}
+        self.sizes = {entry.filename: entry.file_size for entry in entries}
         _check_sizes(self.sizes, path)
-        if sum(self.sizes.values()) > path.stat().st_size:
+        if sum(self.sizes.values()) > os.fstat(self._file.fileno()).st_size:
             raise BundleError(f"{path.name}: its entries overlap.")
 
     def read(self, name: str) -> bytes:
-        with _reading(name), zipfile.ZipFile(self.path) as archive:
-            entry = next(e for e in self.entries if e.filename == name)
-            with archive.open(entry) as file:
-                data = file.read(self.sizes[name] + 1)
-        return _whole(data, self.sizes[name], name)
+        entry = self._entries[name]
+        with _reading(name), self._lock:
+            self._file.seek(entry.header_offset)
+            head = self._file.read(LOCAL_HEAD.size)
+            if len(head) < LOCAL_HEAD.size or not head.startswith(b"PK\3\4"):
+                raise zipfile.BadZipFile("a file does not begin where the directory says")
+            self._file.seek(
+                sum(LOCAL_HEAD.unpack(head)), os.SEEK_CUR
+            )  # its name, and what is extra
+            data = self._file.read(entry.file_size)
+            if zlib.crc32(data) != entry.CRC:
+                raise zipfile.BadZipFile("a file is not the one that was packed")
+        return _whole(data, entry.file_size, name)
 
 
 def _walk(folder: Path, prefix: str, root: Path) -> Iterator[tuple[str, int]]:

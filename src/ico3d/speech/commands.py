@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 import tyro
 
-from ico3d.common.files import read_small
+from ico3d.common.files import read_small, write_atomic
 from ico3d.speech.training.settings import EncoderSettings
 
 if TYPE_CHECKING:
@@ -66,10 +66,9 @@ class TrainSpeech:
     def _metrics(self, step: int) -> TextIO:
         """metrics.jsonl, without what an interrupted run wrote after its last checkpoint."""
         path = self.out / "metrics.jsonl"
-        lines = read_small(path).decode().splitlines(keepends=True) if path.exists() else []
-        file = path.open("w")
-        file.writelines(lines[:step])
-        return file
+        lines = read_small(path).splitlines(keepends=True) if path.exists() else []
+        write_atomic(path, b"".join(lines[:step]))  # a link there is replaced, not followed
+        return path.open("a")
 
     def _held_out(self) -> "list[Batch]":
         """Batches that no training sees."""

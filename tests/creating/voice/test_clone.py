@@ -21,7 +21,7 @@ from ico3d.creating.events import Voiced  # noqa: E402
 from ico3d.creating.looking.advice import Advice  # noqa: E402
 from ico3d.creating.settings import CreateSettings  # noqa: E402
 from ico3d.creating.voice import clone as room  # noqa: E402
-from ico3d.creating.voice.clone import awaits_voice, clone  # noqa: E402
+from ico3d.creating.voice.clone import HEARD, awaits_voice, clone, heard  # noqa: E402
 from ico3d.creating.workplace import workplace  # noqa: E402
 from ico3d.errors import BundleError  # noqa: E402
 
@@ -90,6 +90,19 @@ def test_a_voice_is_cloned_once(settings, fake):
     again, same, _ = cloned(settings)
     assert again is not None and (again.tone == found.tone).all() and same == [told]
     assert fake.ToneColorConverter.made == [converter] and converter.extracted == 1
+
+
+def test_the_sound_of_a_voice_lies_beside_the_avatar_and_is_gone_whatever_happens(tmp_path):
+    """A killed process leaves nothing where neither `forget` nor anybody else looks."""
+    file = tmp_path / "ada.work" / "voice" / HEARD
+
+    def tell(path):
+        assert path == file and path.read_bytes().startswith(b"RIFF")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        heard(np.zeros(100, np.float32), tell, file)
+    assert not file.exists()
 
 
 def test_a_kept_voice_that_is_a_hole_is_not_read(settings, fake):

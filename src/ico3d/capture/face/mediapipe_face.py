@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ico3d.capture.decoding import check_size
-from ico3d.common.native_messages import held_back
+from ico3d.common.native.messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
 LANDMARKS = 478

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numba import njit
 from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
 from ico3d.common.camera import Camera
+from ico3d.common.native.jit import njit
 from ico3d.common.spread import spread
 
 LARGEST_MASK = 512

@@ -1,7 +1,6 @@
 """Clones the voice of a recording, where its owner agreed and OpenVoice is installed."""
 
 import importlib.util
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from ico3d.creating.workplace import Workplace
 from ico3d.errors import BundleError, MissingModelError, SettingsError
 
 RATE = 22_050
+HEARD = "heard.wav"
 """Samples per second that OpenVoice listens to."""
 MOST_VOICE = 1 << 16
 """Bytes of a voice's file, which has 256 numbers."""
@@ -100,16 +100,21 @@ def _made(settings: CreateSettings, place: Workplace) -> dict:
     place.drop_voice()
     speech = clean_speech(read_sound(settings.video, RATE))
     if not speech.fault:
-        write_atomic(place.voice_file(VOICE), voice_to_bytes(heard(speech.samples, tone_colour)))
+        tone = heard(speech.samples, tone_colour, place.voice_file(HEARD))
+        write_atomic(place.voice_file(VOICE), voice_to_bytes(tone))
     return place.note_voice(settings, speech.seconds, speech.fault)
 
 
-def heard(samples: np.ndarray, tell: Callable[[Path], np.ndarray]) -> np.ndarray:
-    """What `tell` says of a sound at `RATE`, which is a file only meanwhile."""
-    with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
-        path = Path(folder) / "voice.wav"
-        path.write_bytes(wav_bytes(samples, RATE))
-        return tell(path)
+def heard(samples: np.ndarray, tell: Callable[[Path], np.ndarray], file: Path) -> np.ndarray:
+    """What `tell` says of a sound at `RATE`, which is a file only meanwhile.
+
+    The file lies where a killed process leaves nothing of the person's voice unseen.
+    """
+    write_atomic(file, wav_bytes(samples, RATE))
+    try:
+        return tell(file)
+    finally:
+        file.unlink(missing_ok=True)
 
 
 def _without(why: Advice, tell: Tell) -> None:

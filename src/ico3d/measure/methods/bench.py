@@ -241,7 +241,10 @@ def _share(threads: int) -> None:
 
 def _logged(trial: Trial) -> dict:
     trial.folder.mkdir(parents=True, exist_ok=True)
-    with (trial.folder / "log.txt").open("a") as log, redirect_stdout(log), redirect_stderr(log):
+    path = trial.folder / "log.txt"
+    if path.is_symlink():
+        path.unlink()
+    with path.open("a") as log, redirect_stdout(log), redirect_stderr(log):
         return trial.run()
 
 

@@ -1,6 +1,8 @@
 """Whisper: a real model file through faster-whisper and pipecat, with random weights."""
 
+import shutil
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -179,3 +181,13 @@ def test_a_core_is_left_to_others(german, monkeypatch):
         monkeypatch.setattr(whisper.os, "cpu_count", lambda cores=cores: cores)
         whisper.load.__wrapped__(german, "cpu", "int8")
         assert seen["cpu_threads"] == threads
+
+
+@pytest.mark.parametrize("model", ["auto", "tiny.en"])
+def test_a_folder_of_a_models_name_is_none(models, random, monkeypatch, model):
+    """A server may be started in a folder of strangers."""
+    monkeypatch.chdir(models)
+    shutil.copytree(random, models / model)
+    with pytest.raises(MissingModelError, match="ico3d weights fetch whisper-"):
+        whisper.find(Settings(model=model))
+    assert whisper.find(Settings(model=f"./{model}")) == Path(model)

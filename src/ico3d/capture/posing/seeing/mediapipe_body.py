@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ico3d.capture.face.mediapipe_face import packed
-from ico3d.common.native_messages import held_back
+from ico3d.common.native.messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
 PURPOSE = "fitting a skeleton"

@@ -20,6 +20,8 @@ ON_CUDA = ("large-v3", "large-v3-turbo", "small", "base", "tiny")
 ON_CPU = ("base", "tiny")  # what is larger takes seconds longer than a visitor waits
 DISTILLED, SMALL_ENGLISH = "distil-large-v3", "tiny.en"
 ENGLISH = (DISTILLED, SMALL_ENGLISH)  # know no other language
+NAMES = (AUTO, *ON_CUDA, *ENGLISH)
+"""What names of models stand for; a folder of such a name is none, wherever a server is started."""
 MOST_THREADS = 4  # of a CPU; more gain nothing for a few seconds of sound
 NEEDED = ("model.bin", "tokenizer.json")  # what is missing would be downloaded in mid-talk
 _loading = threading.Lock()
@@ -102,7 +104,7 @@ def find(settings: Settings) -> Path:
         MissingModelError: If no such model is installed; the sentence says how to get one.
         SettingsError: If the name is unknown.
     """
-    if Path(settings.model).is_dir():
+    if settings.model not in NAMES and Path(settings.model).is_dir():
         return complete(Path(settings.model))
     names = candidates(settings)
     for name in names:
@@ -122,10 +124,9 @@ def candidates(settings: Settings) -> tuple[str, ...]:
     Raises:
         SettingsError: If the settings name an unknown model.
     """
-    known = (*ON_CUDA, *ENGLISH)
     if settings.model != AUTO:
-        if settings.model not in known:
-            names = " or ".join((AUTO, *known))
+        if settings.model not in NAMES:
+            names = " or ".join(NAMES)
             raise SettingsError(
                 f"Whisper '{settings.model}' is unknown, use {names}, or the folder of a model."
             )

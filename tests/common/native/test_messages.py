@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from ico3d.common.native_messages import held_back
+from ico3d.common.native.messages import held_back
 
 
 def test_they_are_not_shown(capfd):
