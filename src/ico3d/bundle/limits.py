@@ -17,6 +17,8 @@ LONGEST = 7200.0
 """Seconds of a recorded motion."""
 MAX_GAUSSIANS = 1_000_000
 MAX_RANK = 64
+MAX_BLENDED = 1 << 23
+"""Gaussians of a head times its rank: a page keeps four numbers of each several times over."""
 MAX_HIDDEN = 1024
 MAX_EXPRESSION_SIZE = 512
 MAX_POSES = 100_000

@@ -290,7 +290,7 @@ def check_manifest(manifest: Manifest) -> None:
 def _check_head(head: HeadInfo) -> None:
     ranges = {
         "num_gaussians": limits.MAX_GAUSSIANS,
-        "rank": limits.MAX_RANK,
+        "rank": min(limits.MAX_RANK, limits.MAX_BLENDED // max(head.num_gaussians, 1)),
         "hidden": limits.MAX_HIDDEN,
         "expression_size": limits.MAX_EXPRESSION_SIZE,
         "num_poses": limits.MAX_POSES,

@@ -188,6 +188,7 @@ function checkHead(head: HeadInfo): void {
     if (!isCount(head[key], MOST[key])) bad(`head.${key}`);
   }
   if (!isCount(head.num_gaussians, MAX_GAUSSIANS)) bad('head.num_gaussians'); // room is made for all before the last ones come
+  if (head.num_gaussians * head.rank > MOST.blended) bad('head.rank');
   if (!isRate(head.fps)) bad('head.fps');
   if (!isRest(head.num_rest, head.num_gaussians)) bad('head.num_rest');
   if (head.num_displacements !== 0 && !isCount(head.num_displacements, MOST.displacements)) bad('head.num_displacements');
@@ -229,7 +230,7 @@ function checkSkinned(info: SkinnedInfo): void {
   if (!Array.isArray(names) || !isCount(names.length, MAX_JOINTS)) bad('skinned.names');
   const tree = isNumbers(parents, names.length) && parents.every((parent, i) => Number.isInteger(parent) && parent < i && parent >= Math.min(i - 1, 0));
   if (!tree) bad('skinned.parents');
-  const most = { num_frames: MOST.posed_frames, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: info.num_frames };
+  const most = { num_frames: MOST.posed_frames, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: Math.min(info.num_frames, MOST.known_poses) };
   for (const [key, top] of Object.entries(most)) if (!isCount(info[key as keyof typeof most], top)) bad(`skinned.${key}`);
   if (info.num_frames < 2) bad('skinned.num_frames');
   if (!isRest(info.num_rest, info.num_gaussians)) bad('skinned.num_rest');

@@ -4,6 +4,9 @@ import { clamp, Glide } from './glide.ts';
 import type { Motion, Seen } from './motion.ts';
 import { SpeechPath } from './path.ts';
 
+/** Utterances whose plans are kept: one is heard, and the next ones wait. */
+const MOST_PLANS = 64;
+
 /** An utterance that is heard now. */
 export interface Spoken {
   utterance: number;
@@ -52,6 +55,7 @@ export class MotionDirector implements Motion {
     const path = this.paths.get(utterance) ?? new SpeechPath();
     path.add(points.map(([sound, body]) => [sound, clamp(body, 0, this.last)]));
     this.paths.set(utterance, path);
+    if (this.paths.size > MOST_PLANS) this.paths.delete(this.paths.keys().next().value!);
   }
 
   /** Drops all plans: a new session counts its utterances from 0. */

@@ -4,6 +4,9 @@ export interface Wanted {
   pace: number; // body seconds per second
 }
 
+/** Points of an utterance, as many as a server plans at most. */
+const MOST = 10_000;
+
 /** What the server planned for one utterance: body time over the time of its sound, in straight lines. */
 export class SpeechPath {
   private points: [number, number][] = []; // (s of sound, s of body), sound strictly growing
@@ -12,7 +15,7 @@ export class SpeechPath {
   add(points: readonly [number, number][]): void {
     for (const [sound, body] of points) {
       while (this.points.length > 0 && this.points.at(-1)![0] >= sound) this.points.pop();
-      this.points.push([sound, body]);
+      if (this.points.length < MOST) this.points.push([sound, body]);
     }
   }
 

@@ -43,6 +43,19 @@ describe('a bundle that Python wrote', () => {
     }
   });
 
+  test('what it has to work through is bounded, as it is for a server', () => {
+    const written = JSON.parse(read('manifest.json').toString());
+    const head = { ...written.head, num_gaussians: 900_000, num_rest: 0, rank: 60 };
+    expect(() => checkManifest({ ...written, head })).toThrow(/head\.rank/);
+    const skinned = {
+      ...{ fps: 25, low: [0, 0, 0], high: [1, 1, 1], names: ['hips'], parents: [-1], num_frames: 4000, num_gaussians: 1 },
+      ...{ num_shapes: 1, num_moving: 1, num_known: 4000, num_rest: 0, num_casters: 0 },
+    };
+    const alone = { ...written, head: null, speech: null, body: null };
+    expect(() => checkManifest({ ...alone, skinned })).toThrow(/skinned\.num_known/);
+    expect(() => checkManifest({ ...alone, skinned: { ...skinned, num_known: 256 } })).not.toThrow(/num_known/);
+  });
+
   test('is told from another person, and from itself in another part', () => {
     const { persona, files } = manifest;
     const others = [

@@ -228,3 +228,11 @@ describe('a damaged animation is refused in one sentence', () => {
   ];
   test.each(cases)('%s', (_, value, sentence) => expect(() => checkAnimation(value, body)).toThrow(sentence));
 });
+
+test('of a plan without an end the points are kept that a server plans at most', () => {
+  const path = new SpeechPath();
+  path.add(Array.from({ length: 20_000 }, (_, i) => [i / 100, i / 100] as [number, number]));
+  expect(path.after(-1)).toHaveLength(10_000);
+  path.add([[5, 1]]); // replaces what was planned from then on
+  expect(path.after(-1)).toHaveLength(501);
+});
