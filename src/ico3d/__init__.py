@@ -7,7 +7,13 @@ __version__ = "0.1.0"
 # onnxruntime reports to its maker from 1.29 on, under an identifier that it keeps; it looks here
 # once, when it is loaded
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
-# numba believes `.numba_config.yaml` of the current folder where a variable says nothing, and
-# unpickles what it finds in the cache that the file names
+# where another library imports numba before `common/native/jit.py` does, it believes a file of the
+# current folder, and unpickles what it finds in the cache that the file names; not beside these
 os.environ.setdefault("NUMBA_CACHE_DIR", "")
 os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", "")
+os.environ.setdefault("NUMBA_CHROME_TRACE", "")
+
+# OpenCV puts its folders and a colon before what this says. Behind a colon nothing is the current
+# folder, from which all processes that are started later would load libraries.
+if not os.environ.get("LD_LIBRARY_PATH"):
+    os.environ["LD_LIBRARY_PATH"] = os.path.join(os.path.dirname(__file__), "no-libraries")

@@ -1,15 +1,11 @@
 """Both backends against the float64 reference."""
 
-import os
-import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from ico3d.capture.surface import hull
 from ico3d.errors import MissingExtraError
 from ico3d.splat import cuda
 from ico3d.splat.cpu.forward import power_of_two
@@ -246,19 +242,3 @@ def test_a_missing_gsplat_names_the_extra(monkeypatch, cameras):
         cuda.draw_gaussians(
             gaussians, gaussians.colors.expand(2, 3, 3), cameras, poses, True, False
         )
-
-
-def test_nothing_is_read_from_the_current_folder(tmp_path):
-    """numba would read its settings there, and unpickle what lies in the cache that they name."""
-    (tmp_path / ".numba_config.yaml").write_text("cache_dir: cache\ndisable_jit: 1\n")
-    program = (
-        "import ico3d.capture.surface.hull as hull, ico3d.splat.cpu.forward\n"
-        "from numba.core import config\n"
-        "assert (config.CACHE_DIR, config.DISABLE_JIT) == ('', 0)\n"
-        "print(hull._look.stats.cache_path)\n"
-    )
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
-    words = [sys.executable, "-P", "-c", program]
-    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert Path(done.stdout.strip()).parent == Path(hull.__file__).parent

@@ -3,12 +3,12 @@
 import statistics
 import time
 
-import numba
 import numpy as np
 import torch
 
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.device import DeviceName
+from ico3d.common.native.jit import numba
 from ico3d.splat.device import computing_device, wait_for
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render

@@ -289,6 +289,8 @@ def _synthetic(
 def _whole(folder: Path, write: Callable[[Path], Path]) -> None:
     """Writes a folder that is there only once it is whole."""
     unfinished = folder.with_name(folder.name + ".unfinished")
+    if unfinished.is_symlink():
+        unfinished.unlink()
     rmtree(unfinished, ignore_errors=True)
     write(unfinished)
     unfinished.rename(folder)

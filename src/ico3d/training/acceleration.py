@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -46,6 +47,13 @@ def accelerated(
     return run
 
 
+def _kept() -> Path:
+    """A folder of the user's own for compiled code."""
+    folder = Path.home() / ".cache" / "ico3d" / "compiled"
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return folder
+
+
 def _compiled(network: Callable[..., Tensor]) -> Callable[..., Tensor]:
     names = [os.environ["CXX"]] if "CXX" in os.environ else ["g++", "clang++"]
     if not any(map(shutil.which, names)):
@@ -53,6 +61,8 @@ def _compiled(network: Callable[..., Tensor]) -> Callable[..., Tensor]:
             f"--compile needs a C++ compiler ({' or '.join(names)}), and none is on the PATH: "
             "install one, or leave --compile out."
         )
+    # By default it lies where other users of the machine may be before us, and is run.
+    os.environ.setdefault("TORCHINDUCTOR_CACHE_DIR", str(_kept()))
     # The number of Gaussians is the first axis of parameters, and density control changes it.
     torch._dynamo.config.force_parameter_static_shapes = False
     return torch.compile(network, dynamic=True)

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import torch
-from numba import prange
 from torch import Tensor
 
+from ico3d.common.native.jit import prange
 from ico3d.splat.cpu.compile import kernel
 from ico3d.training.finite import check_gradient
 

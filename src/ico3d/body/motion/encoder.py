@@ -7,13 +7,13 @@ resolutions of space.
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn.functional import grid_sample, pad
 
 from ico3d.body.motion import encoder_kernels as kernels
+from ico3d.common.native.jit import numba
 from ico3d.errors import SettingsError
 
 SPACE_PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

@@ -5,9 +5,9 @@ three lines are multiplied. Channels are the innermost axis, in groups of `LANES
 have a fixed length, which LLVM unrolls.
 """
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.cpu.compile import kernel, subroutine
 
 LANES = 16

@@ -7,9 +7,9 @@ features times α_1, …, the features times α_M, and α_1 … α_M themselves 
 rows are rounded up to multiples of four (`padded`), with rows of zeros.
 """
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 
 BLOCK = 128

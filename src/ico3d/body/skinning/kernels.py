@@ -4,9 +4,9 @@ A joint's row of the table holds its rotation matrix (9), its translation (3) an
 (4), see `kinematics.transforms`.
 """
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 
 ROW = 16

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numba
 import torch
 
 from ico3d.body.training.train_clip import WindowTask, train_window
 from ico3d.body.workers.overview import Overview
+from ico3d.common.native.jit import numba
 from ico3d.errors import Ico3dError, ModelError
 from ico3d.training.loop import saved_steps
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ico3d.capture.decoding import check_size
+from ico3d.common.native.hidden import hidden
 from ico3d.common.native.messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
@@ -57,8 +58,9 @@ class FaceReader:
             CaptureError: If the model file cannot be used.
         """
         try:
-            import mediapipe
-            from mediapipe.tasks.python import BaseOptions, vision
+            with hidden("sounddevice"):  # which looks for a library in the current folder
+                import mediapipe
+                from mediapipe.tasks.python import BaseOptions, vision
         except ImportError as error:
             raise MissingExtraError("mediapipe", "face", "tracking a portrait") from error
         self._mediapipe = mediapipe

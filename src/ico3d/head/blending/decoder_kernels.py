@@ -3,9 +3,9 @@
 Each kernel passes once over the Gaussians, in parts that do not depend on the number of threads.
 """
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.cpu.compile import PARTS, kernel
 
 SLOPE = np.float32(0.01)

@@ -7,8 +7,8 @@ there is four times slower.
 """
 
 import numpy as np
-from numba import prange
 
+from ico3d.common.native.jit import prange
 from ico3d.splat.cpu.compile import kernel
 from ico3d.training.optimiser import BETA1, BETA2, EPSILON
 

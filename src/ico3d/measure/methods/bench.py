@@ -232,8 +232,9 @@ def _at_a_time(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, dict
 
 def _share(threads: int) -> None:
     """Limits torch and numba in this process to a number of threads."""
-    import numba
     import torch
+
+    from ico3d.common.native.jit import numba
 
     torch.set_num_threads(threads)
     numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore (set at run time)

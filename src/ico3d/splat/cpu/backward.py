@@ -7,9 +7,9 @@
 
 from math import exp2, log
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.splat.cpu.forward import (
     CHECK,

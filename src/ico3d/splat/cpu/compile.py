@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
-from numba.extending import register_jitable
+from ico3d.common.native.jit import numba, register_jitable
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 

@@ -5,9 +5,9 @@
 # pyright: reportUnknownMemberType=false
 # (numba finds the types of a kernel's arguments when it is called)
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.cpu.compile import PARTS, kernel
 
 ONE = np.float32(1)

@@ -7,9 +7,9 @@
 
 from math import e, log2, sqrt
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat import convention
 from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, Tiles, unpack_rows

@@ -7,9 +7,9 @@
 
 from math import log, sqrt
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.convention import BLUR, MIN_ALPHA, NEAR
 from ico3d.splat.cpu.compile import kernel, subroutine
 from ico3d.splat.cpu.geometry import (

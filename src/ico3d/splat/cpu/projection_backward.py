@@ -7,9 +7,9 @@
 
 from math import sqrt
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.convention import BLUR
 from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 from ico3d.splat.cpu.geometry import (

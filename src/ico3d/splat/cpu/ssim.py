@@ -8,9 +8,9 @@ SSIM asks for the sum of both variances alone, so x² + y² is blurred as one ma
 # pyright: reportUnknownMemberType=false
 # (numba finds the types of a kernel's arguments when it is called)
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.convention import SSIM_C1, SSIM_C2, SSIM_RADIUS, ssim_window
 from ico3d.splat.cpu.compile import kernel, subroutine
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import floor, log, sqrt
 
-import numba
 import numpy as np
 
+from ico3d.common.native.jit import numba
 from ico3d.splat.convention import MIN_ALPHA
 from ico3d.splat.cpu.compile import PARTS, kernel, subroutine
 

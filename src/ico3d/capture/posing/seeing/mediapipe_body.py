@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ico3d.capture.face.mediapipe_face import packed
+from ico3d.common.native.hidden import hidden
 from ico3d.common.native.messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
@@ -147,8 +148,9 @@ class HandReader:
 def _imported(model: Path) -> tuple[Any, Any, Any]:
     """MediaPipe, its tasks for pictures, and the options that name a model."""
     try:
-        import mediapipe
-        from mediapipe.tasks.python import BaseOptions, vision
+        with hidden("sounddevice"):  # which looks for a library in the current folder
+            import mediapipe
+            from mediapipe.tasks.python import BaseOptions, vision
     except ImportError as error:
         raise MissingExtraError("mediapipe", "face", PURPOSE) from error
     return mediapipe, vision, BaseOptions(model_asset_path=str(model))
