@@ -134,7 +134,7 @@ describe('an avatar in the page of another origin', () => {
   });
 
   test('tells of gestures and of functions that are called, and has a volume', async () => {
-    const cue = { name: 'wave', mirror: false, begin: 0.5, stroke: 0.9, end: 1.4 };
+    const cue = { number: 0, name: 'wave', mirror: false, begin: 0.5, stroke: 0.9, skip: 0 };
     const levels = await page.evaluate((cue) => {
       const say = (message: object) => window.sockets[0]!.onmessage!(new MessageEvent('message', { data: JSON.stringify(message) }));
       say({ type: 'cues', utterance: 9, cues: [cue], releases: [] });
