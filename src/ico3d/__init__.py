@@ -15,5 +15,10 @@ os.environ.setdefault("NUMBA_CHROME_TRACE", "")
 
 # OpenCV puts its folders and a colon before what this says. Behind a colon nothing is the current
 # folder, from which all processes that are started later would load libraries.
-if not os.environ.get("LD_LIBRARY_PATH"):
-    os.environ["LD_LIBRARY_PATH"] = os.path.join(os.path.dirname(__file__), "no-libraries")
+_libraries = [folder for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
+_none = os.path.join(os.path.dirname(__file__), "no-libraries")
+os.environ["LD_LIBRARY_PATH"] = ":".join(_libraries or [_none])
+
+# PyAV's library for TLS looks for its settings in /tmp/vendor, where its wheel was built and where
+# anybody may put a pipe, which is waited for whenever PyAV is imported
+os.environ.setdefault("GNUTLS_SYSTEM_PRIORITY_FILE", os.devnull)

@@ -10,7 +10,9 @@ import pytest
 from ico3d.common.native.hidden import hidden
 from support.needs import needs
 
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA_", "LD_LIBRARY"))}
+CLEAN = {
+    k: v for k, v in os.environ.items() if not k.startswith(("NUMBA_", "LD_LIBRARY", "GNUTLS"))
+}
 
 
 def said_in(folder: Path, program: str) -> str:
@@ -55,8 +57,19 @@ def test_all_kernels_come_by_the_guarded_way():
 def test_libraries_are_not_looked_for_there_by_what_is_started_later(tmp_path):
     """OpenCV leaves a list of folders that ends in nothing, which means the current folder."""
     pytest.importorskip("cv2")
-    found = said_in(tmp_path, "import ico3d, cv2, os; print(os.environ['LD_LIBRARY_PATH'])")
-    assert all(Path(folder).is_absolute() for folder in found.split(":"))
+    for before in ("", "/opt/x:", ":/opt/x::/opt/y"):
+        program = (
+            f"import os; os.environ['LD_LIBRARY_PATH'] = {before!r}\n"
+            "import ico3d, cv2; print(os.environ['LD_LIBRARY_PATH'])\n"
+        )
+        folders = said_in(tmp_path, program).split(":")
+        assert all(Path(folder).is_absolute() for folder in folders)
+        assert [f for f in folders if f.startswith("/opt")] == [f for f in before.split(":") if f]
+
+
+def test_pyav_looks_for_no_settings_where_anybody_may_put_them(tmp_path):
+    program = "import ico3d, av, os; print(os.environ['GNUTLS_SYSTEM_PRIORITY_FILE'])"
+    assert said_in(tmp_path, program) == os.devnull
 
 
 @needs("mediapipe")
