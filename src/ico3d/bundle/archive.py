@@ -130,9 +130,8 @@ class _Zip(Archive):
             head = self._file.read(LOCAL_HEAD.size)
             if len(head) < LOCAL_HEAD.size or not head.startswith(b"PK\3\4"):
                 raise zipfile.BadZipFile("a file does not begin where the directory says")
-            self._file.seek(
-                sum(LOCAL_HEAD.unpack(head)), os.SEEK_CUR
-            )  # its name, and what is extra
+            behind_names = sum(LOCAL_HEAD.unpack(head))
+            self._file.seek(behind_names, os.SEEK_CUR)
             data = self._file.read(entry.file_size)
             if zlib.crc32(data) != entry.CRC:
                 raise zipfile.BadZipFile("a file is not the one that was packed")

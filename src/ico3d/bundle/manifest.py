@@ -354,13 +354,10 @@ def _check_speech(manifest: Manifest) -> None:
     _require(driven == (speech is not None), "speech", "be there just for heads driven by speech")
     if speech is not None:
         _require(speech.input in ("mel", "features"), "speech.input", "be mel or features")
-        named = (
-            limits.ENCODER.fullmatch(speech.encoder) is not None
-        )  # a file of this name is opened
-        _require(named, "speech.encoder", "be small letters, digits and hyphens")
-        _require(
-            limits.SHA256.fullmatch(speech.sha256) is not None, "speech.sha256", "have 64 digits"
-        )
+        named = limits.ENCODER.fullmatch(speech.encoder)  # a file of this name is opened
+        _require(named is not None, "speech.encoder", "be small letters, digits and hyphens")
+        hashed = limits.SHA256.fullmatch(speech.sha256)
+        _require(hashed is not None, "speech.sha256", "have 64 digits")
         _require(limits.MIN_FPS <= speech.fps <= limits.MAX_FPS, "speech.fps", limits.FPS_RANGE)
         _require(head is None or head.eye_offset == 32, "head.eye_offset", "be 32 for speech")
 

@@ -18,7 +18,7 @@ from ico3d.head.learning_rows import LearningRows
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.portrait.shoulders import shoulders_of
-from ico3d.head.portrait.sight import SHORTENED_EVERY, sight_of
+from ico3d.head.portrait.sight import SHORTENED_EVERY, Sight, sight_of
 from ico3d.head.settings import SGD_GAINS, HeadSettings
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
@@ -270,25 +270,24 @@ class HeadTrainer:
         weights = self.model.row_weights(expression)
         assert features.grad is not None
         self._update_basis(weights, features.grad, rates["basis"])
-        before = self.model.means.detach().clone()  # (N, 3)
+        before = None if self._sight is None else self.model.means.detach().clone()  # (N, 3)
         for name, parameter in self.model.named_parameters():
             if parameter.grad is not None:
                 rate = rates[name if name in GEOMETRY else "mlp"]
                 self._optimiser.update(name, parameter, parameter.grad, rate)
                 parameter.grad = None
-        self._keep_together(before, index)
+        if self._sight is not None and before is not None:
+            self._keep_together(self._sight, before, index)
         bound_scales(self.model)
         self._update_adaptor(rates["adaptor"])
 
     @torch.no_grad()
-    def _keep_together(self, before: Tensor, index: int) -> None:
-        """What a step may not do along the line of sight, if the head is seen from one side."""
+    def _keep_together(self, sight: Sight, before: Tensor, index: int) -> None:
+        """Takes back what a step did along the line of sight and may not do there."""
         model = self.model
-        if self._sight is None:
-            return
-        model.means.data = self._sight.together(model.means.data, before)
+        model.means.data = sight.together(model.means.data, before)
         if index % SHORTENED_EVERY == 0:
-            model.log_scales.data = self._sight.shortened(model.log_scales.data, model.quats.data)
+            model.log_scales.data = sight.shortened(model.log_scales.data, model.quats.data)
 
     def look_closer(self, close_up: CloseUp, index: int) -> None:
         """One step on the basis of the Gaussians that a close-up shows, and on nothing else."""

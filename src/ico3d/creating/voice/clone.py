@@ -20,8 +20,9 @@ from ico3d.creating.workplace import Workplace
 from ico3d.errors import BundleError, MissingModelError, SettingsError
 
 RATE = 22_050
-HEARD = "heard.wav"
 """Samples per second that OpenVoice listens to."""
+HEARD = "heard.wav"
+"""The person's speech, beside the avatar for as long as OpenVoice listens to it."""
 MOST_VOICE = 1 << 16
 """Bytes of a voice's file, which has 256 numbers."""
 LATER = " The same command clones the voice once that is mended."
