@@ -133,6 +133,17 @@ def test_what_the_system_takes_back_meanwhile_hides_no_growth(part, tmp_path, ma
     assert 190 < outcome.most < 260
 
 
+def test_what_was_freed_and_is_kept_for_later_hides_no_growth(part):
+    blocks = [bytes(30_000) for _ in range(10_000)]
+    pin = bytes(30_000)  # behind them, so that the allocator keeps their pages
+    del blocks
+    reader = part("reader").Reader("freed", {"a": write}, lambda: broken("bloats"))
+    bounds = part("bounds")
+    outcome = bounds.measure(reader, range(1), 0, bounds.Bounds(20, 60, 50))
+    assert pin and tuple(outcome.findings) == ("more than 50 MiB",)
+    assert 190 < outcome.most < 260
+
+
 def test_a_reader_whose_sound_inputs_are_refused_is_no_measurement(part):
     def refuse(folder):
         raise Ico3dError("It is not sound.")
