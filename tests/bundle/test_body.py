@@ -242,6 +242,7 @@ def changed(path: str, value) -> bytes:
         ("body.windows.0.ranks", [5, 3], "3 entries"),
         ("body.windows.0.ranks", [5, 0, 2], "ranks"),
         ("body.windows.0.ranks", [17, 3, 2], "ranks"),
+        ("body.windows.0.num_gaussians", 10**6, r"body.windows must move less.* not 1\d{7}\."),
         ("body.windows.0.first", 1, r"windows\[0\].first must be 0"),
         ("body.windows.1.first", 5, r"windows\[1\].first must be 4"),
         ("body.windows.1.last", 4, r"windows\[1\].last"),

@@ -1,7 +1,7 @@
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
-import { floatFromHalf, floatsFromHalves } from '../src/half.ts';
+import { floatFromHalf, floatsFromHalves } from '../src/numbers.ts';
 import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, type SpeechMessage } from '../src/protocol.ts';
 import { decode, encode } from '../src/talk/wire.ts';
 import { runPython } from '../support/python.ts';

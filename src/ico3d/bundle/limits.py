@@ -19,6 +19,10 @@ MAX_GAUSSIANS = 1_000_000
 MAX_RANK = 64
 MAX_BLENDED = 1 << 23
 """Gaussians of a head times its rank: a page keeps four numbers of each several times over."""
+MAX_MOVED = 1 << 22
+"""What a place holds in which every window of a body takes its turn: the most Gaussians of a window,
+times one and the most components of positions, of rotations and of scales of any window. A page
+keeps four numbers of each of these several times over, too."""
 MAX_HIDDEN = 1024
 MAX_EXPRESSION_SIZE = 512
 MAX_POSES = 100_000

@@ -322,6 +322,10 @@ def _check_body(body: BodyInfo) -> None:
     _require(len(body.windows) > 0, "body.windows", "hold one at least")
     for index, window in enumerate(body.windows):
         _check_window(body, index, window)
+    most = [max(ranks) for ranks in zip(*(window.ranks for window in body.windows), strict=True)]
+    room = (1 + sum(most)) * max(window.num_gaussians for window in body.windows)
+    moved = f"move less: most Gaussians × (1 + most ranks) may be {limits.MAX_MOVED}, not {room}"
+    _require(room <= limits.MAX_MOVED, "body.windows", moved)
 
 
 def _check_together(head: HeadInfo, body: BodyInfo | SkinnedInfo) -> None:

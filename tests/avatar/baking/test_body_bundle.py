@@ -172,6 +172,16 @@ def test_without_a_capture_it_is_measured_against_itself():
     )
 
 
+@pytest.mark.parametrize(("largest", "shapes"), [(322_638, 5), (322_639, 3), (599_186, 1)])
+def test_many_gaussians_are_baked_in_shapes_that_a_page_can_hold(largest, shapes):
+    assert body_bundle._fitting(largest) == body_bundle.SHAPES[:shapes]
+
+
+def test_more_gaussians_than_a_page_can_hold_are_refused_before_they_are_baked():
+    with pytest.raises(BundleError, match=r"599187 Gaussians, more than .* \(599186\): train with"):
+        body_bundle._fitting(599_187)
+
+
 def test_what_costs_too_much_is_refused(filmed):
     good = filmed[2][0]
     body_bundle.check([good])

@@ -2,8 +2,8 @@ import type { Actor } from '../actor.ts';
 import type { BodyInfo } from '../bundle/manifest.ts';
 import type { Motion } from '../motion/motion.ts';
 import { WindowGenerator } from './generator.ts';
-import { capacityOf, pack, type PackedWindow } from './packed.ts';
-import { Slots, type Shown, type Slot } from './slots.ts';
+import { capacityOf, pack, texelsOf, type PackedWindow } from './packed.ts';
+import { FAR, NEAR, Slots, type Shown, type Slot } from './slots.ts';
 import { SortWatch, type Sorter } from './sorting.ts';
 import type { Timeline } from './timeline.ts';
 import type { BakedWindow } from './window.ts';
@@ -11,6 +11,7 @@ import type { BakedWindow } from './window.ts';
 const SLOTS = [0, 1] as const;
 const POLL = 10; // ms
 const WAKE = 0.25; // least time before a window may be seen from which on it takes part in sorting, s
+const LARGE = 2 ** 21; // texels, of 8 bytes and more, of which a page has no room for several windows
 const MARGIN = 3; // number of sorts for which that time must suffice: a busy device sometimes takes longer
 
 /** Functions of the page that the body calls. */
@@ -39,7 +40,8 @@ export class Body implements Actor {
     this.motion = motion;
     this.objects = [new WindowGenerator(capacity), new WindowGenerator(capacity)];
     this.watches = [new SortWatch(sorter), new SortWatch(sorter)];
-    this.slots = new Slots(this.timeline, {
+    const reach = texelsOf(capacity) > LARGE ? NEAR : FAR;
+    this.slots = new Slots(this.timeline, reach, {
       load: async (window) => pack(await ports.load(window), capacity),
       put: (slot, content) => this.put(slot, content),
       settled: (slot) => this.objects[slot].awake && this.watches[slot].settled(),

@@ -1,4 +1,4 @@
-import type { BodyInfo } from '../bundle/manifest.ts';
+import { roomFor, type BodyInfo } from '../bundle/manifest.ts';
 import type { BakedWindow, Curve } from './window.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
@@ -23,12 +23,14 @@ export interface PackedWindow {
 }
 
 /** The capacity that suffices for all windows of a body. */
-export function capacityOf({ windows }: BodyInfo): Capacity {
-  const most = (value: (window: BodyInfo['windows'][number]) => number) => Math.max(...windows.map(value));
-  const count = most((window) => window.num_gaussians);
-  const ranks = [0, 1, 2].map((part) => most((window) => window.ranks[part]!));
-  const clusters = most((window) => window.num_clusters);
-  return { count, width: WIDTH, rows: Math.ceil(count / WIDTH), clusters, ranks: ranks as Capacity['ranks'] };
+export function capacityOf(body: BodyInfo): Capacity {
+  const room = roomFor(body);
+  return { ...room, width: WIDTH, rows: Math.ceil(room.count / WIDTH) };
+}
+
+/** Number of texels that a window's basis takes in the textures of a capacity. */
+export function texelsOf({ width, rows, ranks }: Capacity): number {
+  return width * rows * (1 + ranks[0] + ranks[1] + ranks[2]);
 }
 
 /** Lays a window out for the textures of a capacity; what it does not fill is 0. */
@@ -41,7 +43,7 @@ export function pack(window: BakedWindow, capacity: Capacity): PackedWindow {
   window.clusters.forEach((cluster, i) => (rest[4 * i + 3] = cluster));
   const colours = new Uint8Array(layer);
   colours.set(window.rgba);
-  const basis = new Int16Array((1 + ranks[0] + ranks[1] + ranks[2]) * layer);
+  const basis = new Int16Array(4 * texelsOf(capacity));
   basis.set(window.quats);
   const parts = [window.positionBasis, window.rotationBasis, window.scaleBasis];
   let begin = layer;

@@ -1,7 +1,16 @@
 import type { Timeline } from './timeline.ts';
 
-const AHEAD = 2; // number of next windows that are fetched before they are needed
-const MOST_AT_ONCE = 3; // most fetches at the same time, however fast a visitor scrubs
+/** What is fetched before it is needed. */
+export interface Reach {
+  ahead: number; // of the windows that come next
+  beside: boolean; // whether the neighbours of the wanted window as well, in case of a change of way
+  atOnce: number; // most fetches at the same time, however fast a visitor scrubs
+}
+
+/** For windows as people record them. */
+export const FAR: Reach = { ahead: 2, beside: true, atOnce: 3 };
+/** For windows so large that a page has no room for several. */
+export const NEAR: Reach = { ahead: 1, beside: false, atOnce: 1 };
 const RETRY = 2; // s after a failed fetch before the window is fetched again
 
 /** One of the two places on the GPU that hold a window. */
@@ -36,14 +45,16 @@ export interface SlotPorts<T> {
 export class Slots<T> {
   private readonly timeline: Timeline;
   private readonly ports: SlotPorts<T>;
+  private readonly reach: Reach;
   private readonly held: [number | null, number | null] = [null, null]; // index of the window in each slot
   private readonly ready = new Map<number, T>();
   private readonly pending = new Set<number>();
   private readonly retryAt = new Map<number, number>();
   private seen: Slot | null = null;
 
-  constructor(timeline: Timeline, ports: SlotPorts<T>) {
+  constructor(timeline: Timeline, reach: Reach, ports: SlotPorts<T>) {
     this.timeline = timeline;
+    this.reach = reach;
     this.ports = ports;
   }
 
@@ -72,10 +83,10 @@ export class Slots<T> {
     return this.held[slot];
   }
 
-  /** Windows in the order of fetching: the wanted one, the next ones on the body's way, neighbours of the wanted one. */
+  /** Windows in the order of fetching: the wanted one, the next ones on the body's way, perhaps neighbours of the wanted one. */
   private order(wanted: number, stops: readonly number[]): number[] {
-    const { timeline } = this;
-    return [...new Set([wanted, ...timeline.route(wanted, stops, AHEAD), ...timeline.beside(wanted)])];
+    const { timeline, reach } = this;
+    return [...new Set([wanted, ...timeline.route(wanted, stops, reach.ahead), ...(reach.beside ? timeline.beside(wanted) : [])])];
   }
 
   private show(time: number): Shown | null {
@@ -112,7 +123,7 @@ export class Slots<T> {
     const urgent = this.ready.has(order[0]!) ? order : order.slice(0, 1); // the wanted window gets all bandwidth
     for (const window of urgent) {
       const known = this.ready.has(window) || this.pending.has(window);
-      if (known || this.pending.size >= MOST_AT_ONCE || now < (this.retryAt.get(window) ?? -Infinity)) continue;
+      if (known || this.pending.size >= this.reach.atOnce || now < (this.retryAt.get(window) ?? -Infinity)) continue;
       this.pending.add(window);
       this.ports
         .load(window)

@@ -1,3 +1,4 @@
+import { copy } from '../numbers.ts';
 import { makeRows, ROW_BYTES, type SoftObject, type Source } from '../soft/source.ts';
 import { coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
 
@@ -44,14 +45,13 @@ function softWindow({ window, rest, colours, basis }: PackedWindow, { width, row
   const shorts = new Int16Array(rows);
   for (let i = 0; i < count; i++) {
     const [at, texel] = [(i * stride) / 4, 4 * i];
-    floats.set(rest.subarray(texel, texel + 3), at);
+    copy(rest, texel, 3, floats, at);
     for (let k = 0; k < 4; k++) floats[at + 3 + k] = basis[texel + k]! / 32767;
-    floats.set(rest.subarray(layer + texel, layer + texel + 3), at + 7);
+    copy(rest, layer + texel, 3, floats, at + 7);
     for (let k = 0; k < 4; k++) floats[at + 10 + k] = colours[texel + k]! / 255;
     bytes.setUint32(i * stride + 56, rest[texel + 3]!, true);
     for (let k = 0; k < vectors; k++) {
-      const from = (1 + k) * layer + texel;
-      shorts.set(basis.subarray(from, from + 4), (i * stride + ROW_BYTES.window) / 2 + 4 * k);
+      copy(basis, (1 + k) * layer + texel, 4, shorts, (i * stride + ROW_BYTES.window) / 2 + 4 * k);
     }
   }
   return { kind: 'window', count, rows, sizes: [...ranks, 4 * coefficientTexels(ranks)] };

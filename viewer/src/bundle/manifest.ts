@@ -108,8 +108,6 @@ export interface Manifest {
   provenance: Provenance;
 }
 
-const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers of a texture
-
 /**
  * Checks a parsed manifest as far as the page relies on it.
  *
@@ -197,7 +195,7 @@ function checkHead(head: HeadInfo): void {
 
 function checkBody(body: BodyInfo): void {
   if (!isRate(body.fps)) bad('body.fps');
-  if (!isPositive(body.samples_per_frame)) bad('body.samples_per_frame');
+  if (!isCount(body.samples_per_frame, MOST.samples_per_frame)) bad('body.samples_per_frame');
   for (const key of ['low', 'high'] as const) if (!isNumbers(body[key], 3)) bad(`body.${key}`);
   if (!Array.isArray(body.windows) || body.windows.length === 0) bad('body.windows');
   body.windows.forEach((window, i) => {
@@ -207,9 +205,20 @@ function checkBody(body: BodyInfo): void {
     if (first !== begins || !isCount(last - first, MOST.window_frames)) bad(`body.windows[${i}]`);
     if (!isCount(window.num_gaussians, MAX_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
     if (!isCount(window.num_clusters, MAX_CLUSTERS)) bad(`body.windows[${i}].num_clusters`);
-    const counted = isNumbers(ranks, 3) && ranks.every((rank) => isCount(rank, MOST_LAYERS));
-    if (!counted || ranks[0] + ranks[1] + ranks[2] > MOST_LAYERS) bad(`body.windows[${i}].ranks`);
+    if (!isNumbers(ranks, 3) || !ranks.every((rank) => isCount(rank, MOST.body_rank))) bad(`body.windows[${i}].ranks`);
   });
+  const { count, ranks } = roomFor(body);
+  if (count * (1 + ranks[0] + ranks[1] + ranks[2]) > MOST.moved) bad('body.windows');
+}
+
+/** What a place must hold in which every window of a body takes its turn. */
+export function roomFor({ windows }: BodyInfo): { count: number; clusters: number; ranks: [number, number, number] } {
+  const most = (value: (window: WindowInfo) => number) => windows.reduce((all, window) => Math.max(all, value(window)), 0);
+  return {
+    count: most((window) => window.num_gaussians),
+    clusters: most((window) => window.num_clusters),
+    ranks: [most(({ ranks }) => ranks[0]), most(({ ranks }) => ranks[1]), most(({ ranks }) => ranks[2])],
+  };
 }
 
 /** Name of the file of a window of a body. */

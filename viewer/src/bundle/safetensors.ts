@@ -1,5 +1,5 @@
 import { PageError } from '../errors.ts';
-import { floatsFromHalves } from '../half.ts';
+import { allFinite, floatsFromHalves } from '../numbers.ts';
 
 type Values = Float32Array | Int16Array | Uint16Array | Int8Array | Uint8Array; // half floats are widened
 
@@ -117,7 +117,7 @@ export function takeTensor(
       `${file}: ${name} is ${tensor.dtype} (${tensor.shape}) and should be ${dtype} (${shape}).`,
     );
   }
-  if (dtype.startsWith('F') && !tensor.data.every(Number.isFinite)) {
+  if (dtype.startsWith('F') && !allFinite(tensor.data)) {
     throw new PageError(`${file}: ${name} holds numbers that are not finite.`);
   }
   return tensor;

@@ -17,13 +17,18 @@ const USUAL: [number, number, number] = [0, 0.01, 0.06];
  */
 export function eyesOf(head: BakedHead, info: HeadInfo): [number, number, number] {
   const change = changeByBlinking(head, info);
-  const near = Array.from({ length: head.count }, (_, i) => i).filter((i) => isSought(head, i));
-  const step = Math.ceil(near.length / MOST);
-  const looked = near.filter((_, place) => place % step === 0);
-  const changed = looked.map((i) => [i, change(i)] as const).filter(([, weight]) => weight > 0);
+  const near = sampled(head.count, (i) => isSought(head, i));
+  const changed = near.map((i) => [i, change(i)] as const).filter(([, weight]) => weight > 0);
   if (changed.length === 0) return USUAL;
   const middle = (axis: number) => weightedMedian(changed.map(([i, weight]) => [head.means[3 * i + axis]!, weight]));
   return [0, middle(1), middle(2)];
+}
+
+/** Gaussians of `count` that meet a condition: every one, or evenly chosen ones where they are many. */
+export function sampled(count: number, met: (i: number) => boolean): number[] {
+  const all = Array.from({ length: count }, (_, i) => i).filter(met);
+  const step = Math.ceil(all.length / MOST);
+  return all.filter((_, place) => place % step === 0);
 }
 
 function isSought({ means }: BakedHead, i: number): boolean {

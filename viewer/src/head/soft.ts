@@ -1,4 +1,5 @@
 import type { HeadRows } from '../bundle/baked-head.ts';
+import { copy } from '../numbers.ts';
 import { PackedParts } from '../soft/parts.ts';
 import { makeRows, ROW_BYTES, type Late, type SoftObject, type Source } from '../soft/source.ts';
 
@@ -48,20 +49,15 @@ function pack({ count, rank, moves, means, quats, scales, basisScale, meanLogits
   const bytes = new Int8Array(rows);
   for (let i = 0; i < count; i++) {
     const at = (i * stride) / 4;
-    floats.set(means.subarray(3 * i, 3 * i + 3), at);
-    floats.set(quats.subarray(4 * i, 4 * i + 4), at + 3);
+    copy(means, 3 * i, 3, floats, at);
+    copy(quats, 4 * i, 4, floats, at + 3);
     for (let k = 0; k < 3; k++) floats[at + 7 + k] = Math.exp(scales[3 * i + k]!);
     floats[at + 10] = basisScale[i]!;
-    floats.set(meanLogits.subarray(4 * i, 4 * i + 4), at + 11);
+    copy(meanLogits, 4 * i, 4, floats, at + 11);
     floats[at + 15] = share[i]! / 255;
-    for (let k = 0; k < rank; k++) {
-      const from = 4 * (count * k + i);
-      bytes.set(basis.subarray(from, from + 4), i * stride + ROW_BYTES.head + 4 * k);
-    }
-    for (let m = 0; m < moves; m++) {
-      const from = 3 * (count * m + i);
-      bytes.set(displacements.subarray(from, from + 3), i * stride + ROW_BYTES.head + 4 * (rank + m));
-    }
+    const vectors = i * stride + ROW_BYTES.head;
+    for (let k = 0; k < rank; k++) copy(basis, 4 * (count * k + i), 4, bytes, vectors + 4 * k);
+    for (let m = 0; m < moves; m++) copy(displacements, 3 * (count * m + i), 3, bytes, vectors + 4 * (rank + m));
   }
   return { kind: 'head', count, rows, sizes: [rank, moves] };
 }

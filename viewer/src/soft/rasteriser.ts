@@ -41,13 +41,20 @@ export interface Steps {
   blend: number;
 }
 
+const MORE = 1.5; // times the room before, where a source takes more than another one in its place
 const PAIRS = 1 << 18;
 const MOST_PAIRS = 1 << 23; // 0.1 GB; what lies behind so many is left out, which takes tens of thousands of Gaussians that cover the band
+
+/** A source whose rows are in the kernel's memory: as bytes of the page they would be there twice. */
+interface Held extends Omit<Source, 'rows'> {
+  at: number;
+  room: number; // bytes
+}
 
 /** Draws pictures of sources, in the kernel's memory. */
 export class Rasteriser {
   private readonly kernel: Kernel;
-  private readonly held = new Map<number, { source: Source; at: number; room: number }>();
+  private readonly held = new Map<number, Held>();
   private readonly view: Room;
   private readonly values: Room;
   private readonly colours: Room;
@@ -70,12 +77,14 @@ export class Rasteriser {
   }
 
   /** Takes a source, in place of another one of that number. */
-  put(id: number, source: Source): void {
-    const { rows } = source;
+  put(id: number, { rows, ...source }: Source): void {
     let { at, room } = this.held.get(id) ?? { at: 0, room: 0 };
-    if (rows.byteLength > room) [at, room] = [this.kernel.reserve(rows.byteLength), rows.byteLength];
+    if (rows.byteLength > room) {
+      room = Math.max(rows.byteLength, room && MORE * room);
+      at = this.kernel.reserve(room);
+    }
     new Uint8Array(this.kernel.memory.buffer, at, rows.byteLength).set(new Uint8Array(rows));
-    this.held.set(id, { source, at, room });
+    this.held.set(id, { ...source, at, room });
   }
 
   /**
@@ -154,13 +163,13 @@ export class Rasteriser {
 
   private add({ id, view, drawn, values, late }: Placed): void {
     const { kernel } = this;
-    const { source, at } = this.held.get(id)!;
-    const [from, given, count] = [this.view.write(view), this.values.write(values), Math.min(drawn, source.count)];
-    const [a, b, c, d] = source.sizes;
+    const held = this.held.get(id)!;
+    const [at, from, given, count] = [held.at, this.view.write(view), this.values.write(values), Math.min(drawn, held.count)];
+    const [a, b, c, d] = held.sizes;
     kernel.fade(late?.first ?? count, late?.share ?? 1, late?.wide ?? 1);
-    if (source.kind === 'still') kernel.addStill(from, at, count);
-    else if (source.kind === 'head') kernel.addHead(from, at, count, given, a!, b!);
-    else if (source.kind === 'window') kernel.addWindow(from, at, count, given, a!, b!, c!, d!);
+    if (held.kind === 'still') kernel.addStill(from, at, count);
+    else if (held.kind === 'head') kernel.addHead(from, at, count, given, a!, b!);
+    else if (held.kind === 'window') kernel.addWindow(from, at, count, given, a!, b!, c!, d!);
     else kernel.addSkinned(from, at, count, given, a!, b!, c!);
   }
 

@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { Slots, type Shown, type Slot } from '../../src/body/slots.ts';
+import { FAR, NEAR, Slots, type Shown, type Slot } from '../../src/body/slots.ts';
 import { Timeline } from '../../src/body/timeline.ts';
 import type { WindowInfo } from '../../src/bundle/manifest.ts';
 import { MotionDirector, type Spoken } from '../../src/motion/director.ts';
@@ -27,12 +27,12 @@ class Theatre {
   private readonly motion: Motion;
 
   /** @param motion what moves the body; by default its playback there and back */
-  constructor(lasts: number[], latency: number, motion?: Motion) {
+  constructor(lasts: number[], latency: number, motion?: Motion, reach = FAR) {
     this.timeline = new Timeline({ fps: 15, windows: lasts.map((last) => ({ last })) as WindowInfo[] });
     this.playback = new Playback(this.timeline.duration, true);
     this.motion = motion ?? this.playback;
     this.latency = latency;
-    this.slots = new Slots<number>(this.timeline, {
+    this.slots = new Slots<number>(this.timeline, reach, {
       load: (window) => this.load(window),
       put: (slot, window) => this.put(slot, window),
       settled: (slot) => this.now >= this.sortedAt[slot],
@@ -100,6 +100,14 @@ describe('windows in two slots', () => {
     expect(order.slice(0, 10)).toEqual([0, 1, 2, 3, 2, 1, 0, 1, 2, 3]);
     const slots = log.filter(({ window }, i) => window !== log[i - 1]?.window).map(({ slot }) => slot);
     slots.slice(1).forEach((slot, i) => expect(slot).not.toBe(slots[i]));
+  });
+
+  test('large windows come one at a time, the next one alone, and play without a gap all the same', async () => {
+    const theatre = new Theatre([9, 18, 27, 33], 0.25, undefined, NEAR);
+    const log = (await theatre.run(12)).filter((shown) => shown !== null);
+    expect(log.every(({ waiting }) => !waiting)).toBe(true);
+    expect(new Set(log.map(({ window }) => window))).toEqual(new Set([0, 1, 2, 3]));
+    expect(theatre.mostAtOnce).toBe(1);
   });
 
   test('a late window: the old one stays at the border, then it goes on from there', async () => {

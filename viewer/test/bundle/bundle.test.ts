@@ -98,6 +98,9 @@ describe('a damaged bundle is refused in one sentence', () => {
     ['displacements without end', () => checkManifest({ ...manifest, head: { ...manifest.head, num_displacements: 17 } }), /head\.num_displacements/],
     ['poses without end', () => checkManifest({ ...manifest, head: { ...manifest.head, num_poses: 100_001 } }), /head\.num_poses/],
     ['a window without end', () => checkManifest({ ...manifest, head: null, body: lasting(1001) }), /body\.windows\[0\] /],
+    ['a step between windows', () => checkManifest({ ...manifest, head: null, body: { ...lasting(9), samples_per_frame: 9 } }), /body\.samples_per_frame/],
+    ['more components than a body has', () => checkManifest({ ...manifest, head: null, body: windows([1, [17, 1, 1]]) }), /body\.windows\[0\]\.ranks/],
+    ['windows that fill a place each in its own way', () => checkManifest({ ...manifest, head: null, body: windows([233_017, [1, 1, 1]], [9, [14, 1, 1]], [9, [1, 1, 2]]) }), /body\.windows /],
     ['a file without end', () => checkManifest({ ...manifest, files: { x: { sha256: '', size: 2 ** 28 + 1 } } }), /files\.x/],
     ['gestures without end', () => checkManifest({ ...manifest, files: { 'body/gestures.safetensors': { sha256: '', size: 2 ** 22 + 1 } } }), /files\.body/],
     ['an animation without end', () => checkManifest({ ...manifest, files: { 'animation.json': { sha256: '', size: 2 ** 20 + 1 } } }), /files\.animation/],
@@ -124,6 +127,11 @@ function manyFiles(count: number, size: number) {
   return Object.fromEntries(Array.from({ length: count }, (_, i) => [`${i}`, { sha256: '', size }]));
 }
 
+test('windows may fill what a place holds', () => {
+  const body = windows([233_016, [1, 1, 1]], [9, [14, 1, 1]], [9, [1, 1, 2]]);
+  expect(checkManifest({ ...manifest, head: null, body }).body).toEqual(body);
+});
+
 test('a manifest is read no further than it may be long', async () => {
   const located = (text: string) => () => `data:application/json,${encodeURIComponent(text)}`;
   const spaced = JSON.stringify(manifest) + ' '.repeat(2 ** 20 - JSON.stringify(manifest).length);
@@ -136,6 +144,12 @@ test('a manifest is read no further than it may be long', async () => {
 function lasting(frames: number) {
   const window = { first: 0, last: frames, num_gaussians: 1, num_clusters: 1, ranks: [1, 1, 1], file: 'body/0000.safetensors' };
   return { fps: 25, samples_per_frame: 1, low: [0, 0, 0], high: [1, 1, 1], windows: [window] };
+}
+
+/** A body with a window of ten frames for each number of Gaussians and their components. */
+function windows(...kinds: [number, [number, number, number]][]) {
+  const listed = kinds.map(([num_gaussians, ranks], i) => ({ first: 9 * i, last: 9 * i + 9, num_gaussians, num_clusters: 1, ranks, file: `body/000${i}.safetensors` }));
+  return { ...lasting(9), windows: listed };
 }
 
 function entry(dtype: string, shape: number[], size: number): string {

@@ -70,6 +70,15 @@ describe('the rasteriser', () => {
     expect(await drawn(steps)).toBeLessThan(3 * largest);
   });
 
+  test('takes hardly more memory for sources that take turns, each larger than the one before', async () => {
+    const kernel = await makeKernel();
+    const growing = new Rasteriser(kernel);
+    for (let count = 1; count <= 20_000; count += 50) {
+      growing.put(0, { kind: 'still', count, rows: new ArrayBuffer(64 * count), sizes: [] });
+    }
+    expect(kernel.memory.buffer.byteLength).toBeLessThan(8 * 64 * 20_000);
+  });
+
   test('makes no room for what a Gaussian has outside of the picture', async () => {
     const view = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0);
     const [pictures, bytes] = [[] as Uint8Array[], [] as number[]];

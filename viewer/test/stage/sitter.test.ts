@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import type { HeadFiles } from '../../src/bundle/load.ts';
 import type { HeadInfo, Manifest } from '../../src/bundle/manifest.ts';
 import { STILL, type BakedHead } from '../../src/bundle/baked-head.ts';
-import { eyesOf } from '../../src/head/eyes.ts';
+import { eyesOf, sampled } from '../../src/head/eyes.ts';
 import { sitterOf } from '../../src/stage/camera/sitter.ts';
 import { random } from '../../support/random.ts';
 
@@ -12,11 +12,11 @@ const EYES = { y: 0.02, z: 0.085, aside: 0.032 };
 const info = { expression_size: 7, eye_offset: 0, expression_names: [], idle_expression: Array(7).fill(0), num_poses: 2 } as unknown as HeadInfo;
 
 /** The shell of a head whose lids change strongly, and everything else a little, when it blinks. */
-function makeHead(origin = 0): BakedHead {
+function makeHead(origin = 0, count = COUNT): BakedHead {
   const next = random(3);
-  const means = new Float32Array(3 * COUNT);
-  const basis = new Int8Array(4 * COUNT);
-  for (let i = 0; i < COUNT; i++) {
+  const means = new Float32Array(3 * count);
+  const basis = new Int8Array(4 * count);
+  for (let i = 0; i < count; i++) {
     const direction = new Vector3(next() - 0.5, next() - 0.5, next() - 0.5).normalize();
     const [x, y, z] = [0.08 * direction.x, 0.11 * direction.y, 0.09 * direction.z];
     const lid = Math.hypot(Math.abs(x) - EYES.aside, y - EYES.y) < 0.012 && z > 0;
@@ -25,15 +25,15 @@ function makeHead(origin = 0): BakedHead {
   }
   const network = { inputs: 7, hidden: 1, outputs: 1, w1: new Float32Array([0, 0, 0, 0, 0, 0.5, 0.5]) };
   return {
-    count: COUNT,
+    count: count,
     rank: 1,
     moves: 0,
     means,
-    quats: new Float32Array(4 * COUNT),
-    scales: new Float32Array(3 * COUNT),
-    meanLogits: Float32Array.from({ length: 4 * COUNT }, (_, i) => (i % 4 === 3 ? 3 : 0)),
+    quats: new Float32Array(4 * count),
+    scales: new Float32Array(3 * count),
+    meanLogits: Float32Array.from({ length: 4 * count }, (_, i) => (i % 4 === 3 ? 3 : 0)),
     basis,
-    basisScale: new Float32Array(COUNT).fill(0.02),
+    basisScale: new Float32Array(count).fill(0.02),
     displacements: new Int8Array(0),
     moving: STILL,
     network: { ...network, b1: new Float32Array(1), w2: new Float32Array([1]), b2: new Float32Array(1) },
@@ -52,6 +52,12 @@ describe('the eyes of a head', () => {
     const deaf = { ...info, eye_offset: null };
     expect(eyesOf(makeHead(), deaf)).toEqual([0, 0.01, 0.06]);
   });
+});
+
+test('Gaussians are chosen evenly where they are many, else all', () => {
+  expect(sampled(10, (i) => i % 2 === 1)).toEqual([1, 3, 5, 7, 9]);
+  const chosen = sampled(90_001, () => true);
+  expect([chosen.length, chosen[1], chosen.at(-1)]).toEqual([18_001, 5, 90_000]);
 });
 
 describe('who sits before the camera', () => {
@@ -84,6 +90,13 @@ describe('who sits before the camera', () => {
     const around = new Box3(new Vector3(-0.4, 0.02, -0.2), new Vector3(0.4, 1.6, 0.5));
     expect(whole.box.min.distanceTo(around.min)).toBeLessThan(1e-6);
     expect(whole.box.max.distanceTo(around.max)).toBeLessThan(0.02);
+  });
+
+  test('many Gaussians tell the same by a few of them', () => {
+    const many = sitterOf({ camera, body } as unknown as Manifest, { ...files, baked: makeHead(0, 30 * COUNT) }, [0, 1]);
+    expect(many.eyes.distanceTo(whole.eyes)).toBeLessThan(0.005);
+    expect(many.crown).toBeCloseTo(whole.crown, 2);
+    expect(many.box.max.distanceTo(whole.box.max)).toBeLessThan(0.01);
   });
 
   test('strays do not count', () => {

@@ -28,6 +28,7 @@ from ico3d.avatar.clip_views import At, recorded_views
 from ico3d.avatar.moving import MovingBody
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import LICENSES, THUMBNAIL, coarse_first, write_bundle
+from ico3d.bundle.limits import MAX_MOVED
 from ico3d.bundle.manifest import (
     BodyInfo,
     CameraInfo,
@@ -162,9 +163,13 @@ def bake(
         capture: The body's recording, to measure with; None measures against the exact body only.
         head: Returns the exact head on the body, which recorded pictures show as well; None where
             there is no head.
+
+    Raises:
+        BundleError: If a window has more Gaussians than a bundle can move.
     """
+    shapes = _fitting(max(len(body.window_gaussians(i, 0.0)) for i in range(len(body.windows))))
     for index in range(len(body.windows)):
-        yield _best(_attempts(body, index, capture, head))
+        yield _best(_attempts(body, index, capture, head, shapes))
 
 
 def check(results: list[WindowResult]) -> None:
@@ -244,13 +249,33 @@ def strip(body: MovingBody, baked: BakedBody, capture: Capture | None) -> np.nda
     return head_cost.stacked(lines)
 
 
+def _fitting(largest: int) -> tuple[Shape, ...]:
+    """The first of `SHAPES` in which windows of so many Gaussians, mixed anyhow, make a bundle."""
+    fitting = ()
+    for count in range(1, len(SHAPES) + 1):
+        layers = 1 + sum(map(max, zip(*(shape.ranks for shape in SHAPES[:count]), strict=True)))
+        if largest * layers <= MAX_MOVED:
+            fitting = SHAPES[:count]
+    if not fitting:
+        most = MAX_MOVED // (1 + sum(SHAPES[0].ranks))
+        raise BundleError(
+            f"a window has {largest} Gaussians, more than browsers can move ({most}): train with "
+            "fewer (--density.max-gaussians)."
+        )
+    return fitting
+
+
 def _attempts(
-    body: MovingBody, index: int, capture: Capture | None, head: HeadAt | None
+    body: MovingBody,
+    index: int,
+    capture: Capture | None,
+    head: HeadAt | None,
+    shapes: Sequence[Shape],
 ) -> Iterator[WindowResult]:
-    """Bakes and measures a window in each of `SHAPES`, one after the other."""
+    """Bakes and measures a window in each of the shapes, one after the other."""
     span, baker = body.windows[index], WindowBaker(body, index)
     seconds = (span.last - span.first) / body.fps
-    for shape in SHAPES:
+    for shape in shapes:
         baked = baker.baked(shape)
         recorded = recorded_views(capture, span) if capture else []
         probes = probe_views(ring_of_cameras(*seen_box(partial(window_gaussians, baked))), span)

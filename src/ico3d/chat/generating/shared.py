@@ -42,6 +42,9 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
         {
             "rank": limits.MAX_RANK,
             "blended": limits.MAX_BLENDED,
+            "moved": limits.MAX_MOVED,
+            "body_rank": limits.MAX_BODY_RANK,
+            "samples_per_frame": limits.MAX_SAMPLES_PER_FRAME,
             "displacements": MOST_DISPLACEMENTS,
             "hidden": limits.MAX_HIDDEN,
             "expression_size": limits.MAX_EXPRESSION_SIZE,

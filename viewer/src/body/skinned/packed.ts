@@ -1,5 +1,6 @@
 import * as THREE from 'three';
 import type { SkinnedInfo } from '../../bundle/manifest.ts';
+import { copy } from '../../numbers.ts';
 import type { SkinnedRows } from './baked.ts';
 
 const WIDTH = 1024; // texels per row: one texel of each layer is one Gaussian
@@ -28,7 +29,7 @@ export function makeTexels({ num_gaussians: count, num_shapes: shapes }: Skinned
  * and opacity (4 bytes). Layer 2: log scales (3 half floats), colour logits (3) and scales of the shapes
  * (2). Further layers: the residual shapes, 6 bytes each.
  */
-export function fillTexels({ rows: height, layers, words }: Texels, rows: SkinnedRows, begin: number): void {
+export function fillTexels({ rows: height, words }: Texels, rows: SkinnedRows, begin: number): void {
   const layer = 4 * WIDTH * height; // words in a layer
   const size = rows.shapes.length / rows.count; // bytes of a Gaussian's shapes
   const floats = new Float32Array(words.buffer);
@@ -39,20 +40,19 @@ export function fillTexels({ rows: height, layers, words }: Texels, rows: Skinne
   for (let i = 0; i < rows.count; i++) {
     const a = 4 * (begin + i);
     const [b, c] = [a + layer, a + 2 * layer];
-    floats.set(rows.means.subarray(3 * i, 3 * i + 3), a);
-    bytes.set(rows.joints.subarray(4 * i, 4 * i + 4), 4 * (a + 3));
-    shorts.set(rows.quats.subarray(4 * i, 4 * i + 4), 2 * b);
-    bytes.set(rows.weights.subarray(4 * i, 4 * i + 4), 4 * (b + 2));
-    signed.set(rows.normals.subarray(3 * i, 3 * i + 3), 4 * (b + 3));
+    copy(rows.means, 3 * i, 3, floats, a);
+    copy(rows.joints, 4 * i, 4, bytes, 4 * (a + 3));
+    copy(rows.quats, 4 * i, 4, shorts, 2 * b);
+    copy(rows.weights, 4 * i, 4, bytes, 4 * (b + 2));
+    copy(rows.normals, 3 * i, 3, signed, 4 * (b + 3));
     bytes[4 * (b + 3) + 3] = rows.opacities[i]!;
     for (let k = 0; k < 3; k++) {
       halves[2 * c + k] = THREE.DataUtils.toHalfFloat(rows.logScales[3 * i + k]!);
       halves[2 * c + 3 + k] = THREE.DataUtils.toHalfFloat(rows.colorLogits[3 * i + k]!);
     }
     for (let k = 0; k < 2; k++) halves[2 * c + 6 + k] = THREE.DataUtils.toHalfFloat(rows.shapeScales[2 * i + k]!);
-    const row = rows.shapes.subarray(size * i, size * (i + 1));
-    for (let at = 0; at < layers - 3; at++) {
-      signed.set(row.subarray(TEXEL * at, TEXEL * (at + 1)), 4 * (a + (3 + at) * layer));
+    for (let at = 0; at < size; at += TEXEL) {
+      copy(rows.shapes, size * i + at, Math.min(TEXEL, size - at), signed, 4 * (a + (3 + at / TEXEL) * layer));
     }
   }
 }

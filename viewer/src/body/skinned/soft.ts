@@ -1,3 +1,4 @@
+import { copy } from '../../numbers.ts';
 import { SHADOW } from '../../shared.ts';
 import { PackedParts } from '../../soft/parts.ts';
 import { makeRows, ROW_BYTES, type Late, type SoftObject, type Source } from '../../soft/source.ts';
@@ -71,21 +72,21 @@ function pack(baked: SkinnedRows, { num_shapes: shapes, names }: BakedSkinned['i
   const bytes = new Uint8Array(rows);
   for (let i = 0; i < count; i++) {
     const at = (i * stride) / 4;
-    floats.set(baked.means.subarray(3 * i, 3 * i + 3), at);
+    copy(baked.means, 3 * i, 3, floats, at);
     for (let k = 0; k < 4; k++) floats[at + 3 + k] = baked.quats[4 * i + k]! / 32767;
     for (let k = 0; k < 3; k++) floats[at + 7 + k] = Math.exp(baked.logScales[3 * i + k]!);
-    floats.set(baked.colorLogits.subarray(3 * i, 3 * i + 3), at + 10);
+    copy(baked.colorLogits, 3 * i, 3, floats, at + 10);
     floats[at + 13] = baked.opacities[i]! / 255;
-    floats.set(baked.normals.subarray(3 * i, 3 * i + 3), at + 15);
+    copy(baked.normals, 3 * i, 3, floats, at + 15);
     floats[at + 19] = MILLIMETRE * baked.shapeScales[2 * i]!;
     floats[at + 20] = baked.shapeScales[2 * i + 1]!;
-    bytes.set(baked.joints.subarray(4 * i, 4 * i + 4), i * stride + 84);
-    bytes.set(baked.weights.subarray(4 * i, 4 * i + 4), i * stride + 88);
+    copy(baked.joints, 4 * i, 4, bytes, i * stride + 84);
+    copy(baked.weights, 4 * i, 4, bytes, i * stride + 88);
     for (let k = 0; k < shapes; k++) {
       const from = 6 * (shapes * i + k);
       const to = i * stride + ROW_BYTES.skinned + 8 * k;
-      bytes.set(new Uint8Array(baked.shapes.buffer, baked.shapes.byteOffset + from, 3), to);
-      bytes.set(new Uint8Array(baked.shapes.buffer, baked.shapes.byteOffset + from + 3, 3), to + 4);
+      copy(baked.shapes, from, 3, bytes, to);
+      copy(baked.shapes, from + 3, 3, bytes, to + 4);
     }
   }
   return { kind: 'skinned', count, rows, sizes: [shapes, names.length, side] };

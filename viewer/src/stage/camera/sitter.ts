@@ -1,7 +1,7 @@
 import * as THREE from 'three';
 import type { HeadFiles } from '../../bundle/load.ts';
 import { bodyOf, type Manifest } from '../../bundle/manifest.ts';
-import { eyesOf } from '../../head/eyes.ts';
+import { eyesOf, sampled } from '../../head/eyes.ts';
 import { Poses } from '../../head/poses.ts';
 
 /** Somebody to take a picture of, world space, m. */
@@ -67,15 +67,15 @@ function faceOf({ poses }: HeadFiles, rows: readonly number[], local: THREE.Vect
   return [eyes, forward.normalize()];
 }
 
-/** The Gaussians that are seen, in one of the head's poses. */
+/** Gaussians that are seen, in one of the head's poses. */
 function visiblePoints({ baked, poses }: HeadFiles, row: number): THREE.Vector3[] {
   const head = new THREE.Object3D();
   new Poses(poses).apply(row, head);
   head.updateMatrix();
-  const points = Array.from({ length: baked.count }, (_, i) => new THREE.Vector3().fromArray(baked.means, 3 * i));
   const threshold = Math.log(SEEN / (1 - SEEN));
-  const seen = points.filter((_, i) => baked.meanLogits[4 * i + 3]! > threshold);
-  return (seen.length > 0 ? seen : points).map((point) => point.applyMatrix4(head.matrix));
+  const seen = sampled(baked.count, (i) => baked.meanLogits[4 * i + 3]! > threshold);
+  const points = seen.length > 0 ? seen : sampled(baked.count, () => true);
+  return points.map((i) => new THREE.Vector3().fromArray(baked.means, 3 * i).applyMatrix4(head.matrix));
 }
 
 function withoutStrays(points: readonly THREE.Vector3[]): THREE.Vector3[] {

@@ -1,5 +1,5 @@
 import type { Generator } from '../../gaussians/generator.ts';
-import { floatFromHalf } from '../../half.ts';
+import { floatFromHalf } from '../../numbers.ts';
 import type { Stage } from '../stage.ts';
 
 const WORDS = 4; // uint32 per texel
