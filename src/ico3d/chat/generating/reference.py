@@ -4,21 +4,17 @@ Run `python -m ico3d.chat.generating` after each change of a message or of the p
 `$CLIENT`, `$SERVER` and `$PARTS` stand for tables, and other capitalised names for constants.
 """
 
-import types
-import typing
-from dataclasses import is_dataclass
 from pathlib import Path
 from string import Template
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
-
+from ico3d.chat.generating.vocabulary import Vocabulary
 from ico3d.chat.serving import connection, limits, waiting
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import tensors_of
 from ico3d.chat.wire.marks import Length, Range
 from ico3d.common.docstrings import about, notes
-from ico3d.common.typed import field_types, kind_of
+from ico3d.common.typed import Kind, field_types
 
 TARGET = Path(__file__).parents[4] / "docs" / "protocol.md"
 PROSE = Path(__file__).with_name("protocol.md")
@@ -76,33 +72,18 @@ def fields(kind: type) -> list[str]:
     """Name, type and meaning of each field of a message or of a part of one."""
     told = notes(kind)
     return [
-        f"`{name}` ({described(note)}): {told[name]}" for name, note in field_types(kind).items()
+        f"`{name}` ({WORDS.written(note)}): {told[name]}"
+        for name, note in field_types(kind).items()
     ]
 
 
-def described(annotation: Any) -> str:
-    """A type annotation in words, with its limits."""
-    kind = kind_of(annotation)
-    if kind.bare is np.ndarray:
-        tensor = kind.marks[0]
-        return f"{tensor.dims}-dimensional, at most {tensor.max_size:,} elements"
-    bare, origin, arguments = kind.bare, kind.origin, kind.arguments
-    if origin in (types.UnionType, typing.Union):
-        return f"{described(arguments[0])}, or null"
-    if origin is Literal:
-        return " or ".join(f"`{value}`" for value in arguments)
-    if origin is list:
-        return f"list{bounds(kind.marks)}, of {described(arguments[0])}"
-    if origin is tuple:
-        return f"[{', '.join(map(described, arguments))}]"
-    if origin is dict:
-        return f"object{bounds(kind.marks)}, of {described(arguments[1])}"
-    if is_dataclass(bare):
-        return f"**{typing.cast(type, bare).__name__}**"
-    return TYPES[bare] + bounds(kind.marks)
+def array(kind: Kind) -> str:
+    """The size of an array in words."""
+    tensor = kind.marks[0]
+    return f"{tensor.dims}-dimensional, at most {tensor.max_size:,} elements"
 
 
-def bounds(marks: tuple) -> str:
+def bounds(marks: tuple[Any, ...]) -> str:
     """The limits of a value in words, unless they are too wide to matter."""
     for mark in marks:
         if isinstance(mark, Length):
@@ -110,6 +91,19 @@ def bounds(marks: tuple) -> str:
         if isinstance(mark, Range) and 0 < abs(mark.low) < HUGE:
             return f", ≥ {mark.low:g}"
     return ""
+
+
+WORDS = Vocabulary(
+    array=array,
+    maybe=lambda words: f"{words}, or null",
+    words=lambda words: " or ".join(f"`{word}`" for word in words),
+    items=lambda words, kind: f"list{bounds(kind.marks)}, of {words}",
+    fixed=lambda words: f"[{', '.join(words)}]",
+    record=lambda words, kind: f"object{bounds(kind.marks)}, of {words}",
+    part=lambda part: f"**{part.__name__}**",
+    plain=lambda kind: TYPES[kind.bare] + bounds(kind.marks),
+)
+"""A type annotation in words, with its limits."""
 
 
 def cell(text: str) -> str:

@@ -4,16 +4,11 @@ Whoever answers a page may send anything, so the page looks before it takes a te
 """
 
 import json
-import types
-import typing
-from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any, Literal
 
-import numpy as np
-
+from ico3d.chat.generating.vocabulary import Vocabulary
 from ico3d.chat.wire import protocol
-from ico3d.common.typed import field_types, kind_of
+from ico3d.common.typed import field_types
 
 TARGET = Path(__file__).parents[4] / "viewer" / "src" / "talk" / "line" / "fields.ts"
 
@@ -57,26 +52,22 @@ def server_fields() -> str:
 def fields_of(kind: type) -> str:
     """The shapes of a dataclass's fields, without those of arrays."""
     annotations = field_types(kind).items()
-    shapes = [f"{n}: {shape}" for n, annotation in annotations if (shape := shape_of(annotation))]
+    shapes = [
+        f"{n}: {shape}" for n, annotation in annotations if (shape := SHAPE.written(annotation))
+    ]
     return f"{{ {', '.join(shapes)} }}" if shapes else "{}"
 
 
-def shape_of(annotation: Any) -> str:
-    """What a value of a Python annotation must be; empty for an array."""
-    kind = kind_of(annotation)
-    bare, origin, arguments = kind.bare, kind.origin, kind.arguments
-    if bare is np.ndarray:
-        return ""
-    if origin in (types.UnionType, typing.Union):
-        return f"{{ maybe: {shape_of(arguments[0])} }}"
-    if origin is Literal:
-        return f"{{ words: {json.dumps(list(arguments))} }}"
-    if origin is list:
-        return f"{{ list: {shape_of(arguments[0])} }}"
-    if origin is tuple:
-        return f"{{ pair: [{', '.join(map(shape_of, arguments))}] }}"
-    if origin is dict:
-        return f"{{ record: {shape_of(arguments[1])} }}"
-    if is_dataclass(bare):
-        return f"{{ fields: {fields_of(typing.cast(type, bare))} }}"
-    return {int: '"integer"', float: '"number"', str: '"string"', bool: '"boolean"'}[bare]
+SHAPE = Vocabulary(
+    array=lambda _: "",
+    maybe=lambda shape: f"{{ maybe: {shape} }}",
+    words=lambda words: f"{{ words: {json.dumps(list(words))} }}",
+    items=lambda shape, _: f"{{ list: {shape} }}",
+    fixed=lambda shapes: f"{{ pair: [{', '.join(shapes)}] }}",
+    record=lambda shape, _: f"{{ record: {shape} }}",
+    part=lambda part: f"{{ fields: {fields_of(part)} }}",
+    plain=lambda kind: {int: '"integer"', float: '"number"', str: '"string"', bool: '"boolean"'}[
+        kind.bare
+    ],
+)
+"""What a value must be; empty for an array."""

@@ -3,18 +3,15 @@
 Run `python -m ico3d.chat.generating` after each change of the protocol.
 """
 
-import types
-import typing
-from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 
+from ico3d.chat.generating.vocabulary import Vocabulary
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import tensors_of
 from ico3d.common.docstrings import about, notes
-from ico3d.common.typed import field_types, kind_of
+from ico3d.common.typed import field_types
 
 TARGET = Path(__file__).parents[4] / "viewer" / "src" / "protocol.ts"
 
@@ -78,7 +75,7 @@ def interface(kind: type, named: bool) -> str:
         lines.append(f'  type: "{kind.__name__.lower()}";')
     for name, annotation in field_types(kind).items():
         lines.append(f"  /** {told[name]} */")
-        lines.append(f"  {name}: {translated(annotation)};")
+        lines.append(f"  {name}: {TYPE.written(annotation)};")
     return "\n".join([*lines, "}", ""])
 
 
@@ -90,25 +87,17 @@ def exported(kind: type) -> str:
     return kind.__name__ + ("" if kind in NESTED else "Message")
 
 
-def translated(annotation: Any) -> str:
-    """The TypeScript type of a Python annotation."""
-    kind = kind_of(annotation)
-    if kind.bare is np.ndarray:
-        return "Int16Array" if kind.marks[0].dims == 1 else "Matrix"
-    bare, origin, arguments = kind.bare, kind.origin, kind.arguments
-    if origin in (types.UnionType, typing.Union):
-        return f"{translated(arguments[0])} | null"
-    if origin is Literal:
-        return " | ".join(f'"{value}"' for value in arguments)
-    if origin is list:
-        return f"{translated(arguments[0])}[]"
-    if origin is tuple:
-        return f"[{', '.join(translated(argument) for argument in arguments)}]"
-    if origin is dict:
-        return f"Record<string, {translated(arguments[1])}>"
-    if is_dataclass(bare):
-        return exported(typing.cast(type, bare))
-    return {int: "number", float: "number", str: "string", bool: "boolean"}[bare]
+TYPE = Vocabulary(
+    array=lambda kind: "Int16Array" if kind.marks[0].dims == 1 else "Matrix",
+    maybe=lambda name: f"{name} | null",
+    words=lambda words: " | ".join(f'"{word}"' for word in words),
+    items=lambda name, _: f"{name}[]",
+    fixed=lambda names: f"[{', '.join(names)}]",
+    record=lambda name, _: f"Record<string, {name}>",
+    part=exported,
+    plain=lambda kind: {int: "number", float: "number", str: "string", bool: "boolean"}[kind.bare],
+)
+"""The TypeScript type of a Python annotation."""
 
 
 def union(name: str, kinds: tuple[type, ...]) -> str:
