@@ -21,7 +21,7 @@ class Line:
     """A connection, and what deciphers it, which takes eleven bytes at a time."""
 
     def __init__(self):
-        self.came, self.closed, self.room = b"", False, bytearray(11)
+        self.came, self.closed, self.room = bytearray(), False, bytearray(11)
         transport = SimpleNamespace(is_closing=lambda: self.closed, abort=self.abort)
         self.counted = CountedRecords(transport, self)  # type: ignore[arg-type]
 
