@@ -2,6 +2,8 @@
 
 import os
 
+from ico3d.common.native.plotting import guard
+
 __version__ = "0.1.0"
 
 # onnxruntime reports to its maker from 1.29 on, under an identifier that it keeps; it looks here
@@ -22,3 +24,5 @@ os.environ["LD_LIBRARY_PATH"] = ":".join(_libraries or [_none])
 # PyAV's library for TLS looks for its settings in /tmp/vendor, where its wheel was built and where
 # anybody may put a pipe, which is waited for whenever PyAV is imported
 os.environ.setdefault("GNUTLS_SYSTEM_PRIORITY_FILE", os.devnull)
+
+guard()

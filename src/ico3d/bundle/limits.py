@@ -20,7 +20,7 @@ MAX_RANK = 64
 MAX_BLENDED = 1 << 23
 """Gaussians of a head times its rank: a page keeps four numbers of each several times over."""
 MAX_MOVED = 1 << 22
-"""What a place holds in which every window of a body takes its turn: the most Gaussians of a window,
+"""What a place holds in which every window of a body takes its turn: the most Gaussians of a window
 times one and the most components of positions, of rotations and of scales of any window. A page
 keeps four numbers of each of these several times over, too."""
 MAX_HIDDEN = 1024

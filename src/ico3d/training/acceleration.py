@@ -61,8 +61,12 @@ def _compiled(network: Callable[..., Tensor]) -> Callable[..., Tensor]:
             f"--compile needs a C++ compiler ({' or '.join(names)}), and none is on the PATH: "
             "install one, or leave --compile out."
         )
-    # By default it lies where other users of the machine may be before us, and is run.
+    from torch._inductor import config  # takes seconds
+
+    # By default it lies where other users of the machine may be before us, and is run; headers lie
+    # there in any case.
     os.environ.setdefault("TORCHINDUCTOR_CACHE_DIR", str(_kept()))
+    config.cpp_cache_precompile_headers = False
     # The number of Gaussians is the first axis of parameters, and density control changes it.
     torch._dynamo.config.force_parameter_static_shapes = False
     return torch.compile(network, dynamic=True)

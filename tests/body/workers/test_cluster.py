@@ -7,7 +7,7 @@ import tempfile
 
 import pytest
 
-from ico3d.body.workers.cluster import RayCluster, share
+from ico3d.body.workers.cluster import RayCluster, _own, share
 from ico3d.body.workers.jobs import train_windows
 from ico3d.errors import MissingExtraError, SettingsError
 from ico3d.training.run import CHECKPOINT
@@ -87,6 +87,17 @@ class Disturbed(RayCluster):
             os.kill(worker_of(self.victim), signal.SIGKILL)
             self.victim = None
         return super().ended(timeout)
+
+
+def test_auto_is_ones_own_cluster_and_nobody_elses(address, monkeypatch):
+    """Ray would join whatever cluster runs on this machine."""
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    assert _own() == address
+    monkeypatch.setattr(os, "getuid", lambda: 12_345)
+    with pytest.raises(SettingsError, match="no Ray cluster answers at auto: start one"):
+        RayCluster("auto")
+    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:9")
+    assert _own() == "127.0.0.1:9"
 
 
 def test_the_same_files(address, recorded, sequence, tmp_path, capsys):

@@ -18,7 +18,7 @@ CLEAN = {
 def said_in(folder: Path, program: str) -> str:
     """What a program prints that runs in a folder."""
     words = [sys.executable, "-P", "-c", program]
-    done = subprocess.run(words, cwd=folder, env=CLEAN, capture_output=True, text=True)
+    done = subprocess.run(words, cwd=folder, env=CLEAN, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
@@ -67,9 +67,33 @@ def test_libraries_are_not_looked_for_there_by_what_is_started_later(tmp_path):
         assert [f for f in folders if f.startswith("/opt")] == [f for f in before.split(":") if f]
 
 
+@pytest.mark.parametrize("importing", ["matplotlib", "mediapipe"])
+def test_matplotlib_reads_no_settings_there(tmp_path, importing):
+    """42 bytes of them take gigabytes, and a pipe in their place is waited for."""
+    pytest.importorskip(importing)
+    os.mkfifo(tmp_path / "matplotlibrc")
+    program = f"import ico3d, {importing}, matplotlib, os; print(os.path.exists('matplotlibrc'))"
+    assert said_in(tmp_path, program) == "True"
+
+
 def test_pyav_looks_for_no_settings_where_anybody_may_put_them(tmp_path):
     program = "import ico3d, av, os; print(os.environ['GNUTLS_SYSTEM_PRIORITY_FILE'])"
     assert said_in(tmp_path, program) == os.devnull
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what the loader of Linux tells")
+def test_espeak_looks_for_no_library_where_its_wheel_was_built(tmp_path):
+    """There it may be the folder of another user of the machine."""
+    pytest.importorskip("espeakng_loader")
+    program = (
+        "from ico3d.common.espeak.process import Request, speak\n"
+        "print(len(speak(Request('hello', 'en-us', 160, 50, 50)).pcm) > 1000)\n"
+    )
+    words = [sys.executable, "-P", "-c", program]
+    asked = CLEAN | {"LD_DEBUG": "libs"}
+    done = subprocess.run(words, cwd=tmp_path, env=asked, capture_output=True, text=True)
+    assert done.stdout.strip() == "True", done.stderr[-500:]
+    assert "libespeak-ng.so" in done.stderr and "/espeakng-loader/" not in done.stderr
 
 
 @needs("mediapipe")

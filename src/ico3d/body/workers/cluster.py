@@ -5,10 +5,14 @@ installed on each. Workers return results through Ray; their progress is read fr
 """
 
 import logging
+import os
 import socket
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
+
+import psutil
 
 from ico3d.body.training.train_clip import WindowTask
 from ico3d.body.workers.jobs import Lost, work
@@ -16,6 +20,9 @@ from ico3d.errors import Ico3dError, MissingExtraError, SettingsError
 
 ANSWER = 10.0
 """Seconds within which a cluster must accept a connection."""
+AUTO = "auto"
+RAYLET, GCS = "raylet", "--gcs-address="
+"""Ray's process on each machine of a cluster, and the word that tells the cluster's address."""
 
 
 class RayCluster:
@@ -27,7 +34,8 @@ class RayCluster:
         """Connects to a cluster.
 
         Args:
-            address: Address of the cluster: host:port, or "auto" on one of its machines.
+            address: Address of the cluster: host:port, or "auto" on one of its machines, for the
+                cluster that the environment names (RAY_ADDRESS), or else the user's own.
             with_gpus: Whether each window gets a GPU, if the cluster has GPUs.
 
         Raises:
@@ -40,11 +48,13 @@ class RayCluster:
             raise MissingExtraError("ray", "cluster", "training on a Ray cluster") from None
         self._ray: Any = ray
         try:
-            _reach(address)
-            ray.init(address=address, log_to_driver=False, logging_level=logging.WARNING)
+            found = _own() if address == AUTO else address
+            _reach(found)
+            ray.init(address=found, log_to_driver=False, logging_level=logging.WARNING)
         except (OSError, ValueError, RuntimeError) as error:
             raise SettingsError(
-                f"no Ray cluster answers at {address}: start one with ray start --head."
+                f"no Ray cluster answers at {address}: start one with ray start --head, or give "
+                "the address of one."
             ) from error
         self._with_gpus = with_gpus
         self._needs: dict[str, int] = {}
@@ -95,6 +105,28 @@ class RayCluster:
         for reference in self._running:
             self._ray.cancel(reference, force=True)
         self._ray.shutdown()
+
+
+def _own() -> str:
+    """Address of the cluster that the environment names, or to which this user's processes belong.
+
+    Ray itself joins any cluster that runs on the machine, and runs what that answers; whoever uses
+    the machine as well may have begun one.
+
+    Raises:
+        ValueError: If there is none, or more than one.
+    """
+    named = os.environ.get("RAY_ADDRESS", AUTO)
+    if named != AUTO:
+        return named
+    found: set[str] = set()
+    for process in psutil.process_iter(["uids", "cmdline"]):
+        uids, words = process.info["uids"], process.info["cmdline"]
+        if not words or not uids or uids.real != os.getuid() or Path(words[0]).name != RAYLET:
+            continue
+        found |= {one.removeprefix(GCS) for one in words if one.startswith(GCS)}
+    (address,) = found
+    return address
 
 
 def _reach(address: str) -> None:

@@ -30,6 +30,9 @@ _PHONEME = 7  # event type; 0 ends a list of events
 
 LONGEST = 60.0  # s that a text may take on a machine that is busy with other things
 
+NEEDED = ("libstdc++.so.6", "libm.so.6", "libgcc_s.so.1")
+"""What the library needs on Linux, and would look for where its wheel was built, below /home."""
+
 _VOICE = re.compile(r"[A-Za-z0-9_-]+(\+[A-Za-z0-9_-]+)?")
 """Names of voices; a path would be that of any file, which the library would parse."""
 
@@ -107,6 +110,9 @@ def _library() -> Generator[tuple[ctypes.CDLL, int], None, None]:
     """
     import espeakng_loader
 
+    for name in NEEDED:  # what is loaded already is not looked for
+        with contextlib.suppress(OSError):
+            ctypes.CDLL(name)
     source = Path(espeakng_loader.get_library_path())
     data = str(espeakng_loader.get_data_path()).encode()
     with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
