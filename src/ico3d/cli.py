@@ -10,6 +10,7 @@ from typing import Any
 import tyro
 
 from ico3d import __version__
+from ico3d.common.terminal import guard_terminal
 from ico3d.common.unpacking.limits import limit_to_free_memory
 from ico3d.common.unpacking.memory import ran_out
 from ico3d.errors import Ico3dError
@@ -146,6 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     if arguments is None:  # what is started imports nothing from the folder that we are in
         os.environ.setdefault("PYTHONSAFEPATH", "1")
+    guard_terminal()
     words = sys.argv[1:] if arguments is None else arguments
     if words == ["--version"]:
         print(f"ico3d {__version__}")

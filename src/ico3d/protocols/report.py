@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from ico3d.common.files import write_atomic
+from ico3d.errors import printable
 
 MARKDOWN, FIGURES = "report.md", "report.json"
 """Names of the files of a report."""
@@ -149,7 +150,8 @@ class Report:
         head = f"{'#' * level} {self.title}"
         plain = {k: v for k, v in self.facts.items() if not isinstance(v, dict | list)}
         facts = "\n".join(f"- {name}: {value}" for name, value in plain.items())
-        return "\n\n".join([head, facts, *(s.markdown(level + 1, place) for s in self.sections)])
+        text = "\n\n".join([head, facts, *(s.markdown(level + 1, place) for s in self.sections)])
+        return "\n".join(map(printable, text.splitlines()))
 
     def write(self, folder: Path) -> None:
         """Writes `report.md`, and all figures and facts as `report.json`, into a folder."""

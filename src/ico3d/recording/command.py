@@ -12,6 +12,7 @@ import tyro
 from ico3d.avatar.embodying.builds.names import MEDIUM, BuildName
 from ico3d.avatar.embodying.look import AS_RECORDED, Look, OutfitName, check_look
 from ico3d.bundle.packaged import NAME
+from ico3d.errors import printable
 
 OWN = 0o077
 """Umask of the server and of all that it starts: faces are for who records them, not for all users
@@ -99,7 +100,7 @@ class Studio:
         listener.listen()
         print(f"The studio is at {url}{fragment(key)} (Ctrl+C ends)", flush=True)
         print("\n".join(reach.told(listener.getsockname()[1], key)))
-        print(f"Recordings and avatars are in {self.folder}")
+        print(printable(f"Recordings and avatars are in {self.folder}"))
         if room.eye.lacking:
             print(f"Without guidance by the face: {room.eye.lacking}", file=sys.stderr)
         if self.voice and (lacking := hindrance()):

@@ -6,6 +6,8 @@ from typing import Literal
 
 import tyro
 
+from ico3d.errors import printable
+
 
 @dataclass(frozen=True)
 class Convert:
@@ -38,4 +40,5 @@ class Convert:
 def _line(path: Path, kind: str, count: int, degree: int) -> str:
     """What a file of Gaussians holds, in one line."""
     size = path.stat().st_size
-    return f"{path}: {kind}, {count:,} Gaussians, SH degree {degree}, {size:,} bytes"
+    told = f"{path}: {kind}, {count:,} Gaussians, SH degree {degree}, {size:,} bytes"
+    return printable(told)

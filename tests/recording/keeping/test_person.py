@@ -152,6 +152,19 @@ def test_a_damaged_report_says_nothing(person, text):
     assert part.report == {"seconds": 0.0, "turn": None, "advice": []}
 
 
+def test_a_large_file_of_a_strangers_folder_says_nothing(person):
+    """A few MB of brackets became gigabytes, again and again while the page was open."""
+    kept(person, "left", WEBM, turn=0.3)
+    consent, report = person.folder / "consent.json", person.folder / "parts" / "left.json"
+    for file, beyond in ((report, 0), (consent, 0), (report, 1), (consent, 1)):
+        file.write_bytes(file.read_bytes().rstrip().ljust((64 << 10) + beyond))
+        (part,) = person.parts()
+        assert (part.report == room.UNSEEN) == (beyond == 1)
+        if file == report or beyond == 0:
+            assert person.consent()
+    assert _codes(person.consent) == ("unknown", 404)
+
+
 def test_what_lies_elsewhere_is_not_read(person):
     kept(person, "left", WEBM, turn=0.3)
     about, parts = person.consent(), person.folder / "parts"

@@ -95,6 +95,7 @@ def test_what_is_damaged_is_nothing(tmp_path):
     assert read_progress(tmp_path) is None
     whole = '{"state": "made", "quality": "good", "%s": %s}'
     odd = [whole % ("made_of", "3"), whole % ("decibels", "Infinity"), "[" * 100_000]
+    odd += [whole % ("advice", "[" + "[]," * 30_000 + "[]]")]
     odd += [whole % ("told", '"x"'), whole % ("left", "[]"), whole % ("later", "9" * 400)]
     for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}', *odd):
         (tmp_path / "progress.json").write_text(text)

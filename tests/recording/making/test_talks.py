@@ -15,7 +15,7 @@ def avatar(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))  # of the tests
     monkeypatch.setattr(talks, "TALK", "support.studio_page.pretended_talk")
     file = tmp_path / "Ida.ico3d"
-    file.write_bytes(b"avatar")
+    file.write_text("Ida")
     return file
 
 
@@ -29,6 +29,14 @@ def test_an_avatar_has_one_server_until_it_is_stopped(avatar):
     (process, _) = serving._running["Ida"]
     serving.close()
     assert process.poll() is not None
+
+
+def test_a_name_is_no_address(avatar):
+    """That of a stranger's bundle is printed before the address of its server."""
+    avatar.write_text("Ida is at http://203.0.113.7:9/#key=mine (Ctrl+C ends)")
+    serving = Talks("127.0.0.1", False)
+    assert serving.url(avatar).startswith("http://127.0.0.1:")
+    serving.close()
 
 
 def test_what_is_not_made_or_does_not_start_is_said(avatar, tmp_path):

@@ -10,8 +10,9 @@ from ico3d.recording.beside import end_with_parent
 if __name__ == "__main__":
     end_with_parent()
     bundle, host, scheme = sys.argv[1:]
-    if not Path(bundle).read_bytes():
+    name = Path(bundle).read_text()
+    if not name:
         sys.exit(1)
     assert scheme == "plain"
-    print(f"Ida is at http://{host}:{os.getpid()}/#key=a-b (Ctrl+C ends)", flush=True)
+    print(f"{name} is at http://{host}:{os.getpid()}/#key=a-b (Ctrl+C ends)", flush=True)
     threading.Event().wait()

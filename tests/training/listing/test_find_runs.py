@@ -208,6 +208,7 @@ def test_another_program_is_no_command_to_go_on_with(tmp_path):
         "ico3d forget captures/me --yes",
         "ico3d serve demo --port 8661 --settings talk.toml",
         "ico3d studio recordings",
+        "ico3d create a.mp4 a.ico3d --serve",
         "ico3d train",
         "ico3d train speech out",
         "ico3d train body a b --ray evil:10001",

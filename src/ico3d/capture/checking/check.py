@@ -15,7 +15,7 @@ from ico3d.capture.finding import Finding
 from ico3d.common.files import write_atomic
 from ico3d.common.people.stated import NOT_STATED, is_stated
 from ico3d.common.spread import spread
-from ico3d.errors import CaptureError, printable
+from ico3d.errors import CaptureError
 
 SHOWN = 17
 """Number of pictures on the contact sheet, three rows together with the background."""
@@ -210,11 +210,12 @@ def report(capture: Capture, sheet: Path) -> None:
         CaptureError: If a finding is an error.
     """
     findings = examine(capture)
-    table = Table("", "", "finding", title=f"{capture.kind}: {capture.path}", title_justify="left")
+    title = Text(f"{capture.kind}: {capture.path}")
+    table = Table("", "", "finding", title=title, title_justify="left")
     colours = {"ok": "green", "warn": "yellow", "error": "red"}
     for finding in findings:
         table.add_row(
-            finding.what, Text(finding.level, colours[finding.level]), printable(finding.text)
+            Text(finding.what), Text(finding.level, colours[finding.level]), Text(finding.text)
         )
     Console().print(table)
     wrong = [finding for finding in findings if finding.level == "error"]
@@ -223,4 +224,4 @@ def report(capture: Capture, sheet: Path) -> None:
         raise CaptureError(f"{capture.path}: {wrong[0].what}: {wrong[0].text.rstrip('.')}{more}.")
     drawn = contact_sheet(capture, sampled_views(capture, SHOWN))
     write_atomic(sheet, lambda path: drawn.save(path, format="PNG"))
-    Console().print(f"contact sheet: {sheet}")
+    Console().print(Text(f"contact sheet: {sheet}"))

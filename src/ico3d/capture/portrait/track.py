@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import track as progress
 
 from ico3d.capture.capture import Sound
@@ -62,7 +63,8 @@ def track_portrait(
         computing_device(settings.device)  # better known now than after the tracking
     with new_folder(out, settings.likeness, (video.name,)) as work:
         _write(work, opened, model, settings, reached)
-    console.print(f"[green]capture written to {out}[/]; look at it: ico3d capture check {out}")
+    name = escape(str(out))
+    console.print(f"[green]capture written to {name}[/]; look at it: ico3d capture check {name}")
 
 
 def _write(
@@ -110,7 +112,7 @@ def _write(
         f"{track.focal:.0f} px, reprojection error {reprojection_error(readings, track):.2f} px"
     )
     for note in notes:
-        console.print(f"[yellow]warning:[/] {video.path}: {note}.")
+        console.print(f"[yellow]warning:[/] {escape(str(video.path))}: {note}.")
     save_details(work, video, readings, track, settings, notes, seen)
 
 

@@ -7,8 +7,9 @@ from typing import Any, cast, get_args
 
 from ico3d.avatar.embodying.builds.names import BuildName
 from ico3d.avatar.embodying.look import UNCHANGED, Look, OutfitName
-from ico3d.common.files import read_small, write_atomic
-from ico3d.common.typed import parse_json, plain
+from ico3d.common.files import write_atomic
+from ico3d.common.typed import plain
+from ico3d.recording.keeping.noted import noted
 from ico3d.recording.refusals import Refused
 
 FILE = "body.json"
@@ -52,7 +53,7 @@ def read_choice(person: Path, default: BodyChoice) -> BodyChoice:
         default: What counts as long as they did not choose.
     """
     try:
-        return chosen(parse_json(read_small(person / FILE, links=False), FILE, ValueError))
+        return chosen(noted(person / FILE))
     except (OSError, ValueError, AttributeError, Refused):
         return default
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ico3d.common.files import read_small, write_atomic
-from ico3d.common.typed import parse_json
+from ico3d.common.files import write_atomic
 from ico3d.recording.keeping.containers import HEAD, suffix_of
+from ico3d.recording.keeping.noted import noted
 from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD, scripts
 from ico3d.recording.refusals import Refused, no_video, nothing_arrived
 
@@ -65,8 +65,7 @@ class Person:
             Refused: If the file is damaged.
         """
         try:
-            data = read_small(self.folder / CONSENT_FILE, links=False)
-            about = parse_json(data, CONSENT_FILE, ValueError)
+            about = noted(self.folder / CONSENT_FILE)
             said = [about.get(entry, "") for entry in ("language", "consent", VOICE_CONSENT)]
             if all(isinstance(one, str) for one in said) and said[0] in scripts():
                 return about
@@ -208,8 +207,7 @@ class Person:
 
     def _report(self, id: str) -> dict[str, Any]:
         try:
-            data = read_small(self._parts / f"{id}.json", links=False)
-            found = parse_json(data, id, ValueError)
+            found = noted(self._parts / f"{id}.json")
             return {name: found[name] for name in UNSEEN}
         except (OSError, ValueError, TypeError, KeyError):
             return dict(UNSEEN)

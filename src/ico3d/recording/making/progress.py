@@ -9,11 +9,12 @@ from typing import Any, Literal
 
 from PIL import Image
 
-from ico3d.common.files import read_small, write_atomic
-from ico3d.common.typed import parse_json, plain
+from ico3d.common.files import write_atomic
+from ico3d.common.typed import plain
 from ico3d.creating.events import Advanced, Event, Looked, Made, Planned, Preview, Step, Voiced
 from ico3d.creating.looking.advice import Advice, Level
 from ico3d.creating.settings import QualityName
+from ico3d.recording.keeping.noted import noted
 from ico3d.recording.making.estimate import Estimate
 
 FILE, FACE = "progress.json", "face.jpg"
@@ -85,8 +86,7 @@ class Progress:
 def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""
     try:
-        data = read_small(folder / FILE, links=False)
-        found = Progress(**parse_json(data, FILE, ValueError))
+        found = Progress(**noted(folder / FILE))
         left = None if found.left is None else float(found.left)
         numbers = {"left": left, "later": float(found.later), "told": float(found.told)}
         lists = {"advice": tuple(found.advice), "refused": tuple(found.refused)}

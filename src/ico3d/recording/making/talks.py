@@ -53,14 +53,18 @@ class Talks:
             self.stop(name)
 
 
+TOLD = re.compile(rb".* is at (https?://\S+) \(Ctrl\+C ends\)$")
+"""The line in which a server tells its address, behind a name that may be anybody's."""
+
+
 def _read_url(process: subprocess.Popen[bytes]) -> str:
     """The address that a server prints; empty if it ends without one."""
     assert process.stdout is not None
-    for line in process.stdout:
-        found = re.search(rb"https?://\S+", line)
+    for line in map(bytes.rstrip, process.stdout):
+        found = TOLD.search(line)
         if found:
             threading.Thread(target=_drain, args=(process.stdout,), daemon=True).start()
-            return found[0].decode()
+            return found[1].decode()
     return ""
 
 

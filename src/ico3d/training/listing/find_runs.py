@@ -46,6 +46,8 @@ VERBS = tuple(
 """What it does then: these train, and note it. Others remove, serve, or start programs."""
 RAY = "--ray"
 """Option that names a cluster, whose machines may run programs here: never one of strangers."""
+SERVING = "--serve"
+"""Option by which what is made is served, too."""
 WITHIN = 50
 """Runs of which each lies within the one before; what is deeper counts as within the last."""
 State = Literal["finished", "running", "interrupted", "failed", "damaged"]
@@ -214,6 +216,8 @@ def _command(node: _Node) -> str:
 def _is_training(command: tuple[str, ...]) -> bool:
     """Whether a command does nothing but train."""
     if not any(command[: 1 + len(verb)] == (PROGRAM, *verb) for verb in VERBS):
+        return False
+    if any(word.startswith(SERVING) for word in command):
         return False
     clusters = [after for word, after in pairwise((*command, "")) if word == RAY]
     clusters += [word.partition("=")[2] for word in command if word.startswith(f"{RAY}=")]
