@@ -11,7 +11,7 @@ from ico3d.rig.rig import Rig
 from ico3d.studio.acting.acting import pose
 from ico3d.studio.acting.conversing import CONVERSING, conversing
 from ico3d.studio.acting.gestures import act
-from ico3d.studio.choice import load_subject
+from ico3d.studio.person.npz_person import load_npz
 from ico3d.studio.recording import Recording, record
 from support.recordings import synthetic_bodies
 from support.shared import SUBJECTS
@@ -28,7 +28,7 @@ def person(tmp_path_factory):
 def bones():
     if not HUMAN.is_file():
         pytest.skip("the shared subjects are not here")
-    return load_subject(str(HUMAN), whole=True).skeleton
+    return load_npz(HUMAN, True).skeleton
 
 
 def _path(bones, joints, name):
