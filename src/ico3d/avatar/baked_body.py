@@ -9,10 +9,10 @@ import numpy as np
 import torch
 
 from ico3d.avatar.moving import Span, tau_in
-from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.posing import SkinnedPose, posed, recorded_pose
+from ico3d.bundle.windows.baked import BakedWindow
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 

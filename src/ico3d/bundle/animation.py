@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from ico3d.bundle import limits
-from ico3d.bundle.manifest import BodyInfo
 from ico3d.bundle.skinned.info import SkinnedInfo
+from ico3d.bundle.windows.info import BodyInfo
 from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 

@@ -12,7 +12,6 @@ from ico3d.bundle import limits
 from ico3d.bundle.animation import ANIMATION, Animation
 from ico3d.bundle.archive import Archive, open_archive, write_zip
 from ico3d.bundle.backdrop import BACKGROUNDS, check_background
-from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.graph.check import check_onnx
 from ico3d.bundle.head import (
     HEAD,
@@ -30,6 +29,7 @@ from ico3d.bundle.people.voice import VOICE, voice_from_bytes, voice_to_bytes
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
+from ico3d.bundle.windows.baked import BakedWindow
 from ico3d.common.files import read_small
 from ico3d.errors import BundleError
 from ico3d.motion.clip import Clip

@@ -1,6 +1,7 @@
 """Upper limits for bundles, so that a hostile bundle cannot exhaust memory."""
 
 import re
+from collections.abc import Callable
 
 from ico3d.rig.pose_regression import MOST_KNOWN
 
@@ -18,11 +19,13 @@ LONGEST = 7200.0
 MAX_GAUSSIANS = 1_000_000
 MAX_RANK = 64
 MAX_BLENDED = 1 << 23
-"""Gaussians of a head times its rank: a page keeps four numbers of each several times over."""
+"""Gaussians of a head times its rank and displacements: a page keeps four numbers of each of these
+several times over."""
 MAX_MOVED = 1 << 22
 """What a place holds in which every window of a body takes its turn: the most Gaussians of a window
 times one and the most components of positions, of rotations and of scales of any window. A page
-keeps four numbers of each of these several times over, too."""
+keeps four numbers of each of these several times over, too. And the sampled times of a window,
+times its clusters and ranks."""
 MAX_HIDDEN = 1024
 MAX_EXPRESSION_SIZE = 512
 MAX_POSES = 100_000
@@ -45,3 +48,6 @@ MAX_CAMERA_LENGTH = 1e4
 
 ENCODER, SHA256 = re.compile("[a-z0-9-]{1,40}"), re.compile("[0-9a-f]{64}")
 """The name of a speech encoder and the hash of its weights, of which a file's name is made."""
+
+Require = Callable[[bool, str, str], None]
+"""Raises an error unless a condition holds: the condition, the field, and what it must do."""

@@ -15,6 +15,7 @@ from ico3d.bundle.people.provenance import (
 )
 from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
 from ico3d.bundle.skinned.info import SkinnedInfo, check_skinned
+from ico3d.bundle.windows.info import BodyInfo, check_body
 from ico3d.common.expression import MOST_DISPLACEMENTS
 from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import Rules, fill, parse_json, plain
@@ -76,60 +77,6 @@ class HeadInfo:
     idle_expression: tuple[float, ...]
     num_rest: int = 0
     num_displacements: int = 0
-
-
-@dataclass(frozen=True)
-class WindowInfo:
-    """A window: a span of the body's frames that has its own Gaussians.
-
-    Attributes:
-        first: First frame; it is also the last frame of the previous window.
-        last: Last frame.
-        num_gaussians: N, number of Gaussians.
-        num_clusters: C, number of groups of Gaussians with coefficients of their own.
-        ranks: P, R, L: numbers of basis vectors of positions, rotations and scales.
-        file: Name of the window's file: `body/0000.safetensors` and so on.
-    """
-
-    first: int
-    last: int
-    num_gaussians: int
-    num_clusters: int
-    ranks: tuple[int, int, int]
-    file: str
-
-
-@dataclass(frozen=True)
-class BodyInfo:
-    """A body of windows: the counts that the windows' tensors must agree with.
-
-    Attributes:
-        fps: Frames per second; frame i is at i / fps seconds.
-        samples_per_frame: Sampled times per frame: S = samples_per_frame · (last − first) + 1.
-        low: Lower corner of the box that the Gaussians' centres stay in, metres.
-        high: Upper corner of that box, metres.
-        windows: Windows in order of time, without gaps.
-    """
-
-    fps: float
-    samples_per_frame: int
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
-    windows: tuple[WindowInfo, ...]
-
-    def num_samples(self, window: WindowInfo) -> int:
-        """S, the number of sampled times of a window."""
-        return self.samples_per_frame * (window.last - window.first) + 1
-
-    @property
-    def num_frames(self) -> int:
-        """F, the number of frames of the whole clip."""
-        return self.windows[-1].last + 1
-
-
-def window_file(index: int) -> str:
-    """Name of the file of window `index`."""
-    return f"body/{index:04}.safetensors"
 
 
 @dataclass(frozen=True)
@@ -272,7 +219,7 @@ def check_manifest(manifest: Manifest) -> None:
     if head is not None:
         _check_head(head)
     if manifest.body is not None:
-        _check_body(manifest.body)
+        check_body(manifest.body, _require)
     if manifest.skinned is not None:
         check_skinned(manifest.skinned, _require)
     if head is not None and body is not None:
@@ -290,7 +237,7 @@ def check_manifest(manifest: Manifest) -> None:
 def _check_head(head: HeadInfo) -> None:
     ranges = {
         "num_gaussians": limits.MAX_GAUSSIANS,
-        "rank": min(limits.MAX_RANK, limits.MAX_BLENDED // max(head.num_gaussians, 1)),
+        "rank": limits.MAX_RANK,
         "hidden": limits.MAX_HIDDEN,
         "expression_size": limits.MAX_EXPRESSION_SIZE,
         "num_poses": limits.MAX_POSES,
@@ -299,6 +246,10 @@ def _check_head(head: HeadInfo) -> None:
         _require(1 <= getattr(head, name) <= top, f"head.{name}", f"lie between 1 and {top}")
     few = 0 <= head.num_displacements <= MOST_DISPLACEMENTS
     _require(few, "head.num_displacements", f"lie between 0 and {MOST_DISPLACEMENTS}")
+    blended = head.num_gaussians * (head.rank + head.num_displacements)
+    bounded = blended <= limits.MAX_BLENDED
+    most = f"Gaussians × (rank + displacements) may be {limits.MAX_BLENDED}, not {blended}"
+    _require(bounded, "head.rank", f"be less: {most}")
     inside = 0 <= head.num_rest < head.num_gaussians
     _require(inside, "head.num_rest", "be less than head.num_gaussians")
     _require(head.inputs in ("speech", "blendshapes"), "head.inputs", "be speech or blendshapes")
@@ -312,44 +263,11 @@ def _check_head(head: HeadInfo) -> None:
     _require(inside, "head.eye_offset", f"leave room for 7 of the {size} values")
 
 
-def _check_body(body: BodyInfo) -> None:
-    _require(limits.MIN_FPS <= body.fps <= limits.MAX_FPS, "body.fps", limits.FPS_RANGE)
-    top = limits.MAX_SAMPLES_PER_FRAME
-    inside = 1 <= body.samples_per_frame <= top
-    _require(inside, "body.samples_per_frame", f"lie between 1 and {top}")
-    ordered = all(a <= b for a, b in zip(body.low, body.high, strict=True))
-    _require(ordered, "body.low", "be at most body.high")
-    _require(len(body.windows) > 0, "body.windows", "hold one at least")
-    for index, window in enumerate(body.windows):
-        _check_window(body, index, window)
-    most = [max(ranks) for ranks in zip(*(window.ranks for window in body.windows), strict=True)]
-    room = (1 + sum(most)) * max(window.num_gaussians for window in body.windows)
-    moved = f"move less: most Gaussians × (1 + most ranks) may be {limits.MAX_MOVED}, not {room}"
-    _require(room <= limits.MAX_MOVED, "body.windows", moved)
-
-
 def _check_together(head: HeadInfo, body: BodyInfo | SkinnedInfo) -> None:
     """A head on a body is placed frame by frame of the body."""
     _require(head.fps == body.fps, "head.fps", "be that of the body")
     frames = body.num_frames
     _require(head.num_poses == frames, "head.num_poses", f"be {frames}, one per frame of the body")
-
-
-def _check_window(body: BodyInfo, index: int, window: WindowInfo) -> None:
-    where = f"body.windows[{index}]"
-    _require(window.file == window_file(index), f"{where}.file", f"be {window_file(index)}")
-    count, top = window.num_gaussians, limits.MAX_GAUSSIANS
-    _require(1 <= count <= top, f"{where}.num_gaussians", f"lie between 1 and {top}")
-    count, top = window.num_clusters, limits.MAX_CLUSTERS
-    _require(1 <= count <= top, f"{where}.num_clusters", f"lie between 1 and {top}")
-    top = limits.MAX_BODY_RANK
-    inside = all(1 <= rank <= top for rank in window.ranks)
-    _require(inside, f"{where}.ranks", f"lie between 1 and {top}")
-    length, top = window.last - window.first, limits.MAX_WINDOW_FRAMES
-    _require(1 <= length <= top, f"{where}.last", f"be 1 to {top} frames after its first")
-    _require(body.num_samples(window) >= 3, f"{where}.last", "leave three sampled times")
-    begins = body.windows[index - 1].last if index else 0
-    _require(window.first == begins, f"{where}.first", f"be {begins}")
 
 
 def _check_speech(manifest: Manifest) -> None:

@@ -4,18 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import write_bundle
-from ico3d.bundle.manifest import (
-    BodyInfo,
-    CameraInfo,
-    Loss,
-    Manifest,
-    Persona,
-    Provenance,
-    WindowInfo,
-    window_file,
-)
+from ico3d.bundle.manifest import CameraInfo, Loss, Manifest, Persona, Provenance
+from ico3d.bundle.windows.baked import BakedWindow
+from ico3d.bundle.windows.info import BodyInfo, WindowInfo, window_file
 from support.bundles.random_bundle import thumbnail
 
 SPANS, SIZES, RANKS, CLUSTERS = ((0, 4), (4, 6)), (20, 23), (5, 3, 2), 3

@@ -186,10 +186,10 @@ function checkHead(head: HeadInfo): void {
     if (!isCount(head[key], MOST[key])) bad(`head.${key}`);
   }
   if (!isCount(head.num_gaussians, MAX_GAUSSIANS)) bad('head.num_gaussians'); // room is made for all before the last ones come
-  if (head.num_gaussians * head.rank > MOST.blended) bad('head.rank');
   if (!isRate(head.fps)) bad('head.fps');
   if (!isRest(head.num_rest, head.num_gaussians)) bad('head.num_rest');
   if (head.num_displacements !== 0 && !isCount(head.num_displacements, MOST.displacements)) bad('head.num_displacements');
+  if (head.num_gaussians * (head.rank + head.num_displacements) > MOST.blended) bad('head.rank');
   if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
 }
 
@@ -206,6 +206,8 @@ function checkBody(body: BodyInfo): void {
     if (!isCount(window.num_gaussians, MAX_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
     if (!isCount(window.num_clusters, MAX_CLUSTERS)) bad(`body.windows[${i}].num_clusters`);
     if (!isNumbers(ranks, 3) || !ranks.every((rank) => isCount(rank, MOST.body_rank))) bad(`body.windows[${i}].ranks`);
+    const times = body.samples_per_frame * (last - first) + 1;
+    if (times * window.num_clusters * (ranks[0] + ranks[1] + ranks[2]) > MOST.moved) bad(`body.windows[${i}].num_clusters`);
   });
   const { count, ranks } = roomFor(body);
   if (count * (1 + ranks[0] + ranks[1] + ranks[2]) > MOST.moved) bad('body.windows');

@@ -2,6 +2,7 @@ import { dyno } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import type { HeadRows } from '../bundle/baked-head.ts';
 import { SparkTwin } from '../gaussians/spark.ts';
+import { copy } from '../numbers.ts';
 import type { HeadGenerator } from './generator.ts';
 import { MOTION_SIZE } from './shoulders.ts';
 import type { ShownRows } from './soft.ts';
@@ -136,13 +137,14 @@ function fillRest(texels: Float32Array, height: number, rows: ShownRows, begin: 
   const { count, means, quats, scales, meanLogits, basisScale, share } = rows;
   const layer = 4 * WIDTH * height;
   for (let i = 0; i < count; i++) {
-    const [w, x, y, z] = quats.subarray(4 * i);
-    const s = scales.subarray(3 * i);
     const at = 4 * (begin + i);
-    texels.set([means[3 * i]!, means[3 * i + 1]!, means[3 * i + 2]!, basisScale[i]!], at);
-    texels.set(normalised(x!, y!, z!, w!), layer + at); // Spark: xyzw
-    texels.set([Math.exp(s[0]!), Math.exp(s[1]!), Math.exp(s[2]!), share[i]! / 255], 2 * layer + at);
-    texels.set(meanLogits.subarray(4 * i, 4 * i + 4), 3 * layer + at);
+    copy(means, 3 * i, 3, texels, at);
+    texels[at + 3] = basisScale[i]!;
+    const length = Math.hypot(quats[4 * i]!, quats[4 * i + 1]!, quats[4 * i + 2]!, quats[4 * i + 3]!);
+    for (let k = 0; k < 4; k++) texels[layer + at + k] = quats[4 * i + ((k + 1) & 3)]! / length; // Spark: xyzw
+    for (let k = 0; k < 3; k++) texels[2 * layer + at + k] = Math.exp(scales[3 * i + k]!);
+    texels[2 * layer + at + 3] = share[i]! / 255;
+    copy(meanLogits, 4 * i, 4, texels, 3 * layer + at);
   }
 }
 
@@ -157,9 +159,4 @@ function fillBasis(texels: Uint32Array, height: number, { count, rank, moves, ba
     const first = PACKED * ((layersOf(rank) + Math.floor(m / PACKED)) * layer + 4 * begin) + (m % PACKED);
     for (let i = 0; i < 3 * count; i++) bytes[first + PACKED * (i + Math.floor(i / 3))] = displacements[3 * count * m + i]!;
   }
-}
-
-function normalised(...q: [number, number, number, number]): number[] {
-  const length = Math.hypot(...q);
-  return q.map((value) => value / length);
 }

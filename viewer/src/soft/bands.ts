@@ -31,5 +31,12 @@ export class Bands {
   }
 }
 
+/** How many workers may draw where each keeps so many bytes of what is drawn. */
+export function workersFor(bytes: number): number {
+  return Math.min(MOST_WORKERS, Math.max(1, Math.floor(MOST_BYTES / bytes)));
+}
+
+const MOST_WORKERS = 4;
+const MOST_BYTES = 2 ** 28; // of all workers; for somebody with 100,000 Gaussians each has 2e7
 const UNEVEN = 1.15; // the slowest band, of the mean
 const STEP = 0.3; // share of the way to even bands, or they would swing

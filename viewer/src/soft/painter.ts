@@ -1,14 +1,13 @@
 import { Matrix4, Vector3, type Object3D, type PerspectiveCamera, type Scene } from 'three';
 import type { Easel, MakePainter, Painter } from './contract.ts';
 import type { Drawn, Order } from './band.ts';
-import { Bands } from './bands.ts';
+import { Bands, workersFor } from './bands.ts';
 import { Pulse } from './pulse.ts';
 import type { Cloth, Frame, Placed, Steps } from './rasteriser.ts';
 import type { SoftObject, Source } from './source.ts';
 import { TILE_WIDTH } from './tiles.ts';
 import BandWorker from './worker.ts?worker&inline';
 
-const MOST_WORKERS = 4;
 const SHARPNESS = 0.13; // of a picture of full size; by 1/size more, which comes nearest to the fine picture
 const [SHARPNESS_STEPS, MOST_SHARPNESS] = [64, 31]; // as the kernel takes them
 const CLOTH_STEP = 8; // pixels
@@ -30,7 +29,7 @@ class SoftPainter implements Painter {
   private readonly context: CanvasRenderingContext2D;
   private readonly easel: Easel;
   private readonly workers: Worker[];
-  private readonly bands: Bands;
+  private bands: Bands;
   private readonly known = new Map<SoftObject, { id: number; source: Source | null }>();
   private clothKey = '';
   private sharpness = 0; // 64ths
@@ -44,7 +43,7 @@ class SoftPainter implements Painter {
     this.context = easel.canvas.getContext('2d', { alpha: easel.transparent })!;
     this.easel = easel;
     // One core is left to this thread, to sound and to the conversation, which never wait for pictures.
-    const count = Math.max(1, Math.min(MOST_WORKERS, (navigator.hardwareConcurrency || 1) - 1));
+    const count = Math.max(1, Math.min(workersFor(0), (navigator.hardwareConcurrency || 1) - 1));
     this.bands = new Bands(count);
     this.workers = Array.from({ length: count }, (_, i) => {
       const worker = new BandWorker();
@@ -120,9 +119,20 @@ class SoftPainter implements Painter {
     if (!known) this.known.set(soft, (known = { id: this.known.size, source: null }));
     if (known.source !== soft.source) {
       known.source = soft.source;
+      this.spare();
       for (const i of this.workers.keys()) this.tell(i, { put: known.id, source: soft.source! });
     }
     return known.id;
+  }
+
+  /** Lets workers go that have no room for what is drawn: each keeps all of it. */
+  private spare(): void {
+    const bytes = [...this.known.values()].reduce((sum, { source }) => sum + (source?.rows.byteLength ?? 0), 0);
+    const gone = this.workers.splice(workersFor(bytes));
+    if (gone.length === 0) return;
+    for (const worker of gone) worker.terminate();
+    this.drawn = [];
+    this.bands = new Bands(this.workers.length);
   }
 
   /** What is behind everybody as the camera sees it; null if it is as before. */

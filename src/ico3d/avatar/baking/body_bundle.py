@@ -26,18 +26,12 @@ from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, Shape, WindowBake
 from ico3d.avatar.baking.telling.about import About
 from ico3d.avatar.clip_views import At, recorded_views
 from ico3d.avatar.moving import MovingBody
-from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import LICENSES, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.limits import MAX_MOVED
-from ico3d.bundle.manifest import (
-    BodyInfo,
-    CameraInfo,
-    Loss,
-    Manifest,
-    WindowInfo,
-    window_file,
-)
+from ico3d.bundle.manifest import CameraInfo, Loss, Manifest
 from ico3d.bundle.skinned.info import SkinnedInfo
+from ico3d.bundle.windows.baked import BakedWindow
+from ico3d.bundle.windows.info import BodyInfo, WindowInfo, window_file
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
 

@@ -12,8 +12,8 @@ from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME
 from ico3d.avatar.clip_views import VIEWS, At, View, drawn
 from ico3d.avatar.moving import MovingBody, Span
 from ico3d.avatar.staging import NEUTRAL
-from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.manifest import Loss
+from ico3d.bundle.windows.baked import BakedWindow
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread

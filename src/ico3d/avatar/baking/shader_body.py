@@ -10,8 +10,8 @@ import torch
 
 from ico3d.avatar.baking.motion_clusters import Channel, components, group
 from ico3d.avatar.moving import MovingBody
-from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.tensors import QUAT_UNIT
+from ico3d.bundle.windows.baked import BakedWindow
 from ico3d.errors import BundleError
 from ico3d.splat.convention import MIN_ALPHA
 from ico3d.splat.gaussians import Gaussians

@@ -1,11 +1,11 @@
 """The manifest's entry about a body on a skeleton."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ico3d.bundle import limits
+from ico3d.bundle.limits import Require
 from ico3d.errors import BundleError
 from ico3d.rig.rig import MOST_JOINTS, Rig
 
@@ -15,9 +15,6 @@ SKINNED_REST = "body/skinned_rest.safetensors"
 """Name of the file with its less important Gaussians, where there is one."""
 LONGEST_NAME = 64
 """Most characters of a joint's name."""
-
-Require = Callable[[bool, str, str], None]
-"""Raises an error unless a condition holds: the condition, the field, and what it must do."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,6 @@
-import { readPly } from './ply.ts';
+import { checkPly, isPly, readPly } from './ply.ts';
 import { readSpz } from './spz.ts';
-import { isPacked, unpack, unreadable } from './unpacking.ts';
-
-const PLAIN = /^(ply|NGSP)/;
+import { isBounded, isPacked, unpack, unreadable } from './unpacking.ts';
 
 /** A file of splats. */
 export interface SplatFile {
@@ -33,5 +31,6 @@ export async function readSplats(file: SplatFile): Promise<Float32Array | null> 
  */
 export async function checkSplats({ name, bytes }: SplatFile): Promise<void> {
   if (isPacked(bytes)) await unpack(bytes, name);
-  else if (!PLAIN.test(new TextDecoder('latin1').decode(new Uint8Array(bytes, 0, Math.min(4, bytes.byteLength))))) throw unreadable(name);
+  else if (isPly(bytes)) checkPly(bytes, name);
+  else if (!isBounded(bytes)) throw unreadable(name);
 }

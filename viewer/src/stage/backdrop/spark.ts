@@ -20,9 +20,9 @@ class Backdrop implements Actor {
     this.objects = [mesh];
     this.least = least;
     this.soft = Object.assign(mesh, { soft: new SoftBackdrop(mesh) }).soft;
-    const sizes: number[] = [];
-    mesh.forEachSplat((index, _, { x, y, z }, __, opacity) => sizes.push(sizeOf(index, opacity, x, y, z)));
-    this.sizes = Float32Array.from(sizes).sort();
+    this.sizes = new Float32Array(mesh.numSplats);
+    mesh.forEachSplat((index, _, { x, y, z }, __, opacity) => (this.sizes[index] = sizeOf(index, opacity, x, y, z)));
+    this.sizes.sort();
   }
 
   tick(): boolean {
@@ -60,8 +60,12 @@ class SoftBackdrop implements SoftObject {
 
 function pack(mesh: SplatMesh): Source {
   const rows = new Float32Array(NUMBERS * mesh.numSplats);
-  mesh.forEachSplat((index, centre, scales, { x, y, z, w }, opacity, { r, g, b }) => {
-    rows.set([...centre.toArray(), w, x, y, z, ...scales.toArray(), r, g, b, opacity], NUMBERS * index);
+  mesh.forEachSplat((index, centre, scales, turn, opacity, colour) => {
+    const at = NUMBERS * index;
+    centre.toArray(rows, at);
+    [rows[at + 3], rows[at + 4], rows[at + 5], rows[at + 6]] = [turn.w, turn.x, turn.y, turn.z];
+    scales.toArray(rows, at + 7);
+    [rows[at + 10], rows[at + 11], rows[at + 12], rows[at + 13]] = [colour.r, colour.g, colour.b, opacity];
   });
   return sourceOf(rows);
 }

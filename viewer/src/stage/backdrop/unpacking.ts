@@ -14,6 +14,18 @@ export function isPacked(bytes: ArrayBuffer): boolean {
   return bytes.byteLength >= 2 && new DataView(bytes).getUint16(0, true) === GZIP;
 }
 
+/** Whether a file begins as SPZ of version 4 does, and promises no more splats than there may be. */
+export function isBounded(bytes: ArrayBuffer): boolean {
+  if (bytes.byteLength < HEADER) return false;
+  const header = new DataView(bytes);
+  return header.getUint32(0, true) === MAGIC && isAllowed(header.getUint32(8, true));
+}
+
+/** Whether there may be so many splats. */
+export function isAllowed(count: number): boolean {
+  return count >= 1 && count <= MAX_GAUSSIANS;
+}
+
 /** What is said of splats that cannot be read. */
 export function unreadable(name: string): PageError {
   return new PageError(`${name} holds no splats that this page can read.`);

@@ -13,6 +13,14 @@ function ply(rows: number[][], columns = COLUMNS, format = 'binary_little_endian
   return Uint8Array.from([...new TextEncoder().encode(header), ...floats]).buffer;
 }
 
+/** A PLY file with a header's tables and so many bytes behind it. */
+function bytesOf(tables: string, size: number): ArrayBuffer {
+  const header = new TextEncoder().encode(`ply\nformat binary_little_endian 1.0\nelement ${tables}\nend_header\n`);
+  const file = new Uint8Array(header.length + size);
+  file.set(header);
+  return file.buffer;
+}
+
 /** An SPZ file of tables of bytes, with positions in 4096ths. */
 function spz(version: number, count: number, tables: number[][], pack: (bytes: Uint8Array) => Uint8Array = gzipSync): ArrayBuffer {
   const header = new DataView(new ArrayBuffer(16));
@@ -90,9 +98,26 @@ describe('splats behind a person', () => {
 
   test('are checked before Spark reads them', async () => {
     await checkSplats({ name: 'background.spz', bytes: whole });
-    await checkSplats({ name: 'background.ply', bytes: ply([]) });
+    const floats = ply([Array(15).fill(0)]);
+    await checkSplats({ name: 'background.ply', bytes: floats });
+    await checkSplats({ name: 'background.spz', bytes: floats });
+    await checkSplats({ name: 'background.ply', bytes: bytesOf('chunk 1\nproperty float a\nelement vertex 2\nproperty uint b\nproperty uchar c', 14) });
     const zip = new TextEncoder().encode('PK\x03\x04').buffer;
     await expect(checkSplats({ name: 'background.ply', bytes: zip })).rejects.toThrow('no splats that this page can read');
+  });
+
+  test.each([
+    ['without splats', bytesOf('vertex 0\nproperty uchar a', 0)],
+    ['of more splats than there may be', bytesOf('vertex 1000001\nproperty uchar a', 1_000_001)],
+    ['that lacks a byte', bytesOf('vertex 9\nproperty ushort a', 17)],
+    ['that goes on behind its tables', bytesOf('vertex 9\nproperty ushort a', 19)],
+    ['of two tables of splats', bytesOf('vertex 1\nproperty uchar a\nelement vertex 1000000\nproperty uchar a', 1_000_001)],
+    ['of lists', bytesOf('vertex 9\nproperty list uchar int a', 36)],
+    ['of rows without columns', bytesOf('vertex 9\nproperty uchar a\nelement face 900000000', 9)],
+    ['whose number is none', bytesOf('vertex 0x9\nproperty uchar a', 9)],
+    ['without an end of its header', new TextEncoder().encode('ply\nformat binary_little_endian 1.0\n').buffer],
+  ])('are refused in a PLY %s', async (_, bytes) => {
+    await expect(checkSplats({ name: 'background.ply', bytes })).rejects.toThrow('no splats that this page can read');
   });
 
   test('are not unpacked further than their header promises', async () => {

@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ico3d.bundle.manifest import BodyInfo, WindowInfo
 from ico3d.bundle.tensors import QUAT_UNIT, Spec, decode_tensors, encode_tensors
+from ico3d.bundle.windows.info import BodyInfo, WindowInfo
 from ico3d.errors import BundleError
 
 _MAX_LENGTH = 1e4

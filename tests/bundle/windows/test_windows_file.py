@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ico3d.bundle.body import BakedWindow, _continued, _largest
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Manifest
+from ico3d.bundle.windows.baked import BakedWindow, _continued, _largest
 from ico3d.errors import BundleError
 from support.bundles.json_values import json_values
 from support.bundles.random_body import (
@@ -215,6 +215,18 @@ def test_flipped_bytes_never_pass_as_another_body(body_bytes, tmp_path, data):
     np.testing.assert_array_equal(bundle.window(1).means, WINDOWS[1].means)
 
 
+@pytest.mark.parametrize("clusters", [174, 175])
+def test_curves_are_bounded(clusters):
+    """A file of a few MB, packed, would be hundreds on a page."""
+    window = replace(BODY.windows[0], last=1000, num_clusters=clusters, ranks=(1, 1, 1))
+    told = replace(MANIFEST, body=replace(BODY, samples_per_frame=8, windows=(window,))).to_json()
+    if clusters == 174:
+        assert Manifest.from_json(told).body.windows == (window,)
+        return
+    with pytest.raises(BundleError, match=r"num_clusters must be less: times .* not 4200525\."):
+        Manifest.from_json(told)
+
+
 def changed(path: str, value) -> bytes:
     manifest = json.loads(json.dumps(VALID))
     place = manifest
@@ -242,7 +254,11 @@ def changed(path: str, value) -> bytes:
         ("body.windows.0.ranks", [5, 3], "3 entries"),
         ("body.windows.0.ranks", [5, 0, 2], "ranks"),
         ("body.windows.0.ranks", [17, 3, 2], "ranks"),
-        ("body.windows.0.num_gaussians", 10**6, r"body.windows must move less.* not 1\d{7}\."),
+        (
+            "body.windows.0.num_gaussians",
+            10**6,
+            r"body.windows must be less: .* not 11000000\.",
+        ),
         ("body.windows.0.first", 1, r"windows\[0\].first must be 0"),
         ("body.windows.1.first", 5, r"windows\[1\].first must be 4"),
         ("body.windows.1.last", 4, r"windows\[1\].last"),

@@ -1,0 +1,1 @@
+"""Bodies of windows: their entry in the manifest, and their files."""
