@@ -18,7 +18,8 @@ from ico3d.avatar.baking.body_bundle import WindowResult
 from ico3d.avatar.baking.shader_body import Shape, WindowBaker
 from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera
 from ico3d.bundle.format import Bundle
-from ico3d.bundle.manifest import Loss, Persona, window_file
+from ico3d.bundle.manifest import Loss, Persona
+from ico3d.bundle.windows.info import window_file
 from support.avatars.moving_body import FPS, MovingPerson
 from support.avatars.origins import about, origin
 
