@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
+from typing import Any
 
 GUARDED, SETTINGS = "matplotlib", "matplotlibrc"
 
@@ -32,7 +33,7 @@ def _blind(executed: Callable[[ModuleType], None]) -> Callable[[ModuleType], Non
     def run(module: ModuleType) -> None:
         exists = os.path.exists
 
-        def elsewhere(path: str) -> bool:
+        def elsewhere(path: Any) -> bool:
             return path != SETTINGS and exists(path)
 
         os.path.exists = elsewhere
