@@ -43,7 +43,7 @@ describe.skipIf(!demoUrl)('a first visit to the packaged person at 10 Mbit/s (ne
 
   test('shows a face soon, after few bytes', () => {
     expect(seconds).toBeLessThan(LONGEST * slowness());
-    expect(first.bytes).toBeLessThan(MOST_BYTES);
+    expect(first.bytes).toBeLessThan(MOST_BYTES * slowness()); // more comes while a busy machine draws
     expect(first.scripts).toBeGreaterThan(0.5e6); // it was counted
     expect(first.scripts).toBeLessThan(MOST_SCRIPT);
   });
