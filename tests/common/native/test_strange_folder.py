@@ -15,12 +15,17 @@ CLEAN = {
 }
 
 
+def run_in(folder: Path, program: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Runs a program in a folder."""
+    words, about = [sys.executable, "-P", "-c", program], {**CLEAN, **variables}
+    done = subprocess.run(words, cwd=folder, env=about, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done
+
+
 def said_in(folder: Path, program: str) -> str:
     """What a program prints that runs in a folder."""
-    words = [sys.executable, "-P", "-c", program]
-    done = subprocess.run(words, cwd=folder, env=CLEAN, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    return run_in(folder, program).stdout.strip()
 
 
 def test_numba_reads_no_settings_there(tmp_path):
@@ -89,10 +94,8 @@ def test_espeak_looks_for_no_library_where_its_wheel_was_built(tmp_path):
         "from ico3d.common.espeak.process import Request, speak\n"
         "print(len(speak(Request('hello', 'en-us', 160, 50, 50)).pcm) > 1000)\n"
     )
-    words = [sys.executable, "-P", "-c", program]
-    asked = CLEAN | {"LD_DEBUG": "libs"}
-    done = subprocess.run(words, cwd=tmp_path, env=asked, capture_output=True, text=True)
-    assert done.stdout.strip() == "True", done.stderr[-500:]
+    done = run_in(tmp_path, program, LD_DEBUG="libs")
+    assert done.stdout.strip() == "True"
     assert "libespeak-ng.so" in done.stderr and "/espeakng-loader/" not in done.stderr
 
 

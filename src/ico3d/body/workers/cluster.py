@@ -136,7 +136,7 @@ def _reach(address: str) -> None:
         OSError: If the address does not accept a connection.
     """
     host, _, port = address.removeprefix("ray://").rpartition(":")
-    if port.isdigit():  # not so for words such as "auto"
+    if port.isdigit():  # else Ray judges it
         socket.create_connection((host, int(port)), ANSWER).close()
 
 

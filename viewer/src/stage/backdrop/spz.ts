@@ -18,19 +18,19 @@ export async function readSpz(bytes: ArrayBuffer, name: string): Promise<Float32
   const [alphas, colours, scales, rotations] = [9, 10, 13, 16].map((before) => HEADER + before * count) as [number, number, number, number];
   const rows = new Float32Array(NUMBERS * count);
   for (let i = 0; i < count; i++) {
-    const row = rows.subarray(NUMBERS * i, NUMBERS * (i + 1));
+    const at = NUMBERS * i;
     for (let k = 0; k < 3; k++) {
       const place = HEADER + 9 * i + 3 * k;
-      row[k] = step * (data.getUint16(place, true) | (data.getInt8(place + 2) << 16));
-      row[7 + k] = Math.exp(data.getUint8(scales + 3 * i + k) / 16 - 10);
-      row[10 + k] = colourOf((data.getUint8(colours + 3 * i + k) / 255 - 0.5) / COLOUR_SCALE);
+      rows[at + k] = step * (data.getUint16(place, true) | (data.getInt8(place + 2) << 16));
+      rows[at + 7 + k] = Math.exp(data.getUint8(scales + 3 * i + k) / 16 - 10);
+      rows[at + 10 + k] = colourOf((data.getUint8(colours + 3 * i + k) / 255 - 0.5) / COLOUR_SCALE);
     }
-    row[13] = data.getUint8(alphas + i) / 255;
+    rows[at + 13] = data.getUint8(alphas + i) / 255;
     const turn = version === 2 ? vectorTurn(data, rotations + 3 * i) : packedTurn(data.getUint32(rotations + 4 * i, true));
     // By half around x: y and z change their signs, of places and of axes.
-    row[1] = -row[1]!;
-    row[2] = -row[2]!;
-    row.set([turn[3]!, turn[0]!, -turn[1]!, -turn[2]!], 3);
+    rows[at + 1] = -rows[at + 1]!;
+    rows[at + 2] = -rows[at + 2]!;
+    rows.set([turn[3]!, turn[0]!, -turn[1]!, -turn[2]!], at + 3);
   }
   return rows;
 }

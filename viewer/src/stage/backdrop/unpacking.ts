@@ -107,7 +107,7 @@ class Unpacked {
     const row = (version === 2 ? 19 : 20) + 3 * ((degree + 1) ** 2 - 1);
     const allowed = SPZ.ratio * this.packed + SPZ.free;
     const isKnown = magic === MAGIC && (version === 2 || version === 3) && degree <= SPZ.degree;
-    if (!isKnown || count < 1 || count > MAX_GAUSSIANS || count * row > allowed) return;
+    if (!isKnown || !isAllowed(count) || count * row > allowed) return;
     const all = new Uint8Array(HEADER + count * row);
     all.set(this.kept);
     this.kept = all;
