@@ -2,7 +2,7 @@
 
 import subprocess
 
-from ico3d.recording.beside import start
+from ico3d.recording.beside import start, stop
 
 
 def test_modules_of_the_folder_are_not_imported(tmp_path, monkeypatch):
@@ -11,3 +11,14 @@ def test_modules_of_the_folder_are_not_imported(tmp_path, monkeypatch):
     (tmp_path / "planted.py").write_text("print('taken over')")
     told, _ = start("planted", [], subprocess.PIPE).communicate()
     assert b"No module named planted" in told
+
+
+def test_who_reads_later_than_the_end_finds_the_end():
+    """Another thread may end the process before its reader has begun to read."""
+    process = start(
+        "timeit", ["-n", "1", "-r", "1", "import time; time.sleep(60)"], subprocess.PIPE
+    )
+    stop(process)
+    assert process.stdout is not None and process.poll() is not None
+    with process.stdout as printed:
+        assert printed.read() == b""

@@ -57,7 +57,10 @@ def start(
 
 
 def stop(process: subprocess.Popen[bytes]) -> None:
-    """Ends a process and all that it started; returns when it is gone."""
+    """Ends a process and all that it started; returns when it is gone.
+
+    Its output stays open for whoever reads it, perhaps in another thread, and closes it.
+    """
     if process.poll() is None:
         try:
             os.killpg(process.pid, signal.SIGTERM)
@@ -67,6 +70,5 @@ def stop(process: subprocess.Popen[bytes]) -> None:
         process.wait()
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)
-    for stream in (process.stdin, process.stdout):
-        if stream is not None:
-            stream.close()
+    if process.stdin is not None:
+        process.stdin.close()

@@ -103,8 +103,8 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
   await says(first, QUEUED);
   await says(second, IDLE);
   await goes(first);
-  expect(await first.page.textContent('#record')).not.toContain('Who are you?');
-  expect(await pressed(first)).toBe('false');
+  await expect.poll(() => first.page.textContent('#record')).not.toContain('Who are you?');
+  await expect.poll(() => pressed(first)).toBe('false');
 }, 300_000);
 
 test('a server that is gone is told of, and what was typed stays; back again, no old question stands over the new greeting', async () => {

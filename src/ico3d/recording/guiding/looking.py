@@ -78,11 +78,12 @@ class Looks:
         self._running[process] = file
         slow = threading.Timer(SLOWEST * seconds, process.kill)
         slow.start()
-        if self._is_closed:
+        if self._is_closed or not file.exists():  # the end came before the process was known
             process.kill()
         try:
             assert process.stdout is not None
-            told = process.stdout.read()
+            with process.stdout as printed:
+                told = printed.read()
             status = process.wait()
         finally:
             slow.cancel()

@@ -68,7 +68,8 @@ class Durations:
                 return
             self._process = start(self._pace, [], subprocess.PIPE)
         assert self._process.stdout is not None
-        printed = self._process.stdout.read().decode(errors="replace")
+        with self._process.stdout as out:
+            printed = out.read().decode(errors="replace")
         stop(self._process)
         self._step = _step_in(printed)
         if self._step is None and not self._ended.is_set():

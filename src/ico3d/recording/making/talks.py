@@ -3,8 +3,8 @@
 import re
 import subprocess
 import threading
-from collections.abc import Iterable
 from pathlib import Path
+from typing import IO
 
 from ico3d.recording.beside import start, stop
 from ico3d.recording.refusals import Refused
@@ -65,10 +65,12 @@ def _read_url(process: subprocess.Popen[bytes]) -> str:
         if found:
             threading.Thread(target=_drain, args=(process.stdout,), daemon=True).start()
             return found[1].decode()
+    process.stdout.close()
     return ""
 
 
-def _drain(printed: Iterable[bytes]) -> None:
+def _drain(out: IO[bytes]) -> None:
     """Reads what is printed to its end: a full pipe would stop the server."""
-    for _ in printed:
-        pass
+    with out as printed:
+        for _ in printed:
+            pass
