@@ -19,7 +19,7 @@ describe('a typed question', () => {
     await until(browser, finished(0)); // the greeting
     expect(await page.locator('#answer').textContent()).toBe('Hello.');
     expect(await page.locator('#stand-ins').textContent()).toBe(
-      'Small offline services listen, answer, and speak; the settings tell of better ones',
+      'Basic offline services listen, answer, and speak; better ones are in the settings',
     );
 
     await page.evaluate(() => {

@@ -16,7 +16,7 @@ afterAll(() => browser?.close());
 
 test('the line about small services stays until a first question was answered, and the settings tell it for ever', async () => {
   const { page } = browser;
-  const told = 'Small offline services listen, answer, and speak';
+  const told = 'Basic offline services listen, answer, and speak';
   expect(await page.textContent('#stand-ins')).toMatch(told);
   expect(await page.isVisible('#stand-ins')).toBe(true); // she has said "Hello", nobody asked
   await page.fill('#text', SHORTER);
