@@ -21,6 +21,7 @@ from ico3d.errors import Ico3dError, MissingModelError
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
 from support.chat.serving import OFFLINE, TYPED, free_port, serving
+from support.waiting import until
 
 pytestmark = pytest.mark.slow
 
@@ -161,9 +162,7 @@ async def test_a_pipeline_that_ends_takes_its_session_along(bundle, told, end, a
             _, error = await page.wait(Error, timeout=10)
             assert error.fatal and error.again and "broke off" in error.message
             assert await asyncio.wait_for(page.closed(), 5) == 1000
-        async with asyncio.timeout(5):
-            while len(sessions):
-                await asyncio.sleep(0.02)
+        await until(lambda: len(sessions) == 0)
         again, begun = await open_page(url, welcome.session, -1, microphone=False)
         assert not begun.resumed
         await again.wait(Speech)

@@ -12,6 +12,7 @@ from ico3d.recording.guiding.looking import MOST_AT_ONCE
 from support.chat.serving import running
 from support.needs import needs
 from support.studio_page.parts import begun, part_file
+from support.waiting import until
 
 pytestmark = [needs("av"), pytest.mark.slow]
 REPORT = {"seconds": 1.0, "turn": None, "advice": []}
@@ -68,6 +69,7 @@ async def test_abandoned_requests_are_looked_at_once_or_not_at_all(server):
     port, looks, may_end = server
     takes = [b"text-%d/a%d" % (n % 2 + 1, n) for n in range(4)]
     asked = [await _ask(port, b"Eve", take) for take in takes for _ in range(15)]
+    await until(lambda: len(looks) == MOST_AT_ONCE)
     await asyncio.sleep(0.5)
     for writer in asked:
         writer.close()
@@ -87,13 +89,11 @@ async def test_a_person_with_many_parts_keeps_another_waiting_for_one(server):
     port, looks, may_end = server
     takes = [b"text-%d/a%d" % (n % 2 + 1, n) for n in range(4, 8)]
     asked = [await _ask(port, b"Eve", take) for take in takes]
-    await asyncio.sleep(0.3)
+    await until(lambda: len(looks) == MOST_AT_ONCE)
     asked.append(await _ask(port, b"Bob", b"text-1/a0"))
     await asyncio.sleep(0.3)
     may_end.set()
-    async with asyncio.timeout(30):
-        while len(looks) < 5:
-            await asyncio.sleep(0.05)
+    await until(lambda: len(looks) == 5)
     assert [name for name, _ in looks].index("Bob") <= MOST_AT_ONCE + 1
     for writer in asked:
         writer.close()
@@ -106,6 +106,7 @@ async def test_pictures_that_nobody_waits_for_are_not_looked_at(server):
         _, writer = await asyncio.open_connection("127.0.0.1", port)
         writer.write(LOOK)
         asked.append(writer)
+    await until(lambda: len(looks) > 0)
     await asyncio.sleep(0.5)
     for writer in asked:
         writer.close()

@@ -28,6 +28,7 @@ from support.chat.remote import (
     serving,
 )
 from support.chat.serving import visiting
+from support.waiting import until
 
 pytestmark = pytest.mark.slow
 
@@ -207,15 +208,28 @@ async def test_a_stream_that_breaks_is_not_taken_for_whole():
 
 
 async def test_more_requests_than_allowed_are_told_to_wait():
-    app = service_app("language", lambda: Odd("hang"), Limits(requests=1, seconds=2.0))
+    made = []
+
+    def hanging():
+        made.append(Odd("hang"))
+        return made[-1]
+
+    app = service_app("language", hanging, Limits(requests=1, seconds=2.0))
     async with serving(app) as url, visiting(url) as plain:
         body = {"model": "any", "messages": [{"role": "user", "content": "hi"}]}
         first = asyncio.create_task(plain.post("/v1/chat/completions", json=body))
-        await asyncio.sleep(0.3)
+        await until(lambda: len(made) == 1)
         second = await plain.post("/v1/chat/completions", json=body)
         assert second.status_code == 429 and second.headers["retry-after"] == "1"
         assert (await first).status_code == 504
         assert json.loads((await plain.get("/health")).text)["ok"]
+
+
+async def taken(plain):
+    """Waits until the only place is taken."""
+    async with asyncio.timeout(30):
+        while (await plain.get("/v1/models")).status_code != 429:
+            await asyncio.sleep(0.01)
 
 
 @contextlib.asynccontextmanager
@@ -231,11 +245,11 @@ async def begun(url):
 
 
 async def test_a_request_that_never_comes_gives_its_place_back(monkeypatch):
-    monkeypatch.setattr(door, "SILENCE", 0.5)
+    monkeypatch.setattr(door, "SILENCE", 2.0)
     ask = {"messages": [{"role": "user", "content": "who are you"}]}
     app = service_app("language", make_language, Limits(requests=1))
     async with serving(app) as url, begun(url) as (reader, _), visiting(url) as http:
-        await asyncio.sleep(0.2)
+        await taken(http)
         assert (await http.post("v1/chat/completions", json=ask)).status_code == 429
         assert b" 400 " in await asyncio.wait_for(reader.readline(), 5)
         assert (await http.post("v1/chat/completions", json=ask)).status_code == 200
@@ -258,7 +272,7 @@ async def test_a_request_that_drips_gives_its_place_back(monkeypatch):
 
 
 async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
-    monkeypatch.setattr(door, "SILENCE", 0.5)
+    monkeypatch.setattr(door, "SILENCE", 2.0)
     body = json.dumps({"input": "One two three four five six seven. " * 116}).encode()  # 9 MB
     async with serving(service_app("voice", make_voice, Limits(requests=1))) as url:
         address = httpx.URL(url)
@@ -270,8 +284,7 @@ async def test_an_answer_that_nobody_reads_gives_its_place_back(monkeypatch):
             kind = "Content-Type: application/json", f"Content-Length: {len(body)}"
             silent.send("\r\n".join((*head, *kind, "", "")).encode() + body)
             async with visiting(url) as http, asyncio.timeout(60):
-                await asyncio.sleep(0.2)
-                assert (await http.get("v1/models")).status_code == 429
+                await taken(http)
                 while (await http.get("v1/models")).status_code == 429:
                     await asyncio.sleep(0.2)
 

@@ -13,6 +13,7 @@ from ico3d.chat.services.bounded import Limits
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools.mcp import Connection
 from support.chat.scripted_server import running
+from support.waiting import until
 
 httpx2 = pytest.importorskip("httpx2")
 NO_METHOD = {"code": -32601, "message": "no such method"}
@@ -194,9 +195,7 @@ async def test_streams_are_not_opened_again_without_a_pause(monkeypatch, is_resu
     async with running(app) as port:
         connection = Connection(McpServer("m", url=f"http://127.0.0.1:{port}/mcp", seconds=2))
         asked = asyncio.create_task(connection.functions())
-        async with asyncio.timeout(60):  # the first of a process imports the SDK
-            while methods.count("GET") < 3:
-                await asyncio.sleep(0.05)
+        await until(lambda: methods.count("GET") >= 3, 60)  # the first imports the SDK
         await asyncio.sleep(2.5)
         assert methods.count("GET") <= 3 + 4
         if is_resumed:

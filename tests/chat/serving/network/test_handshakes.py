@@ -8,6 +8,7 @@ import pytest
 
 from ico3d.chat.serving.network import handshakes, prompt
 from support.chat.serving import visiting
+from support.waiting import until
 
 
 async def is_closed(reader, seconds):
@@ -30,11 +31,10 @@ async def test_handshakes_count_as_connections_of_their_machine(secured, monkeyp
     assert await is_closed(lines[3][0], 5) and await is_closed(lines[4][0], 5)
     for _, writer in lines[:2]:
         writer.close()
-    await asyncio.sleep(0.5)
+    await until(lambda: prompt._open["10.0.0.7"] == 1)
     assert await health(port, trust) == 200  # in a place that has become free
     lines[2][1].close()
-    await asyncio.sleep(0.5)
-    assert prompt._open["10.0.0.7"] == 0
+    await until(lambda: prompt._open["10.0.0.7"] == 0)
 
 
 @pytest.mark.parametrize("sent", [b"", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc"])

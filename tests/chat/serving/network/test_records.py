@@ -20,10 +20,10 @@ REQUEST = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 class Line:
     """A connection, and what deciphers it, which takes eleven bytes at a time."""
 
-    def __init__(self):
+    def __init__(self, machine=""):
         self.came, self.closed, self.room = bytearray(), False, bytearray(11)
         transport = SimpleNamespace(is_closing=lambda: self.closed, abort=self.abort)
-        self.counted = CountedRecords(transport, self)  # type: ignore[arg-type]
+        self.counted = CountedRecords(transport, self, machine)  # type: ignore[arg-type]
 
     def abort(self):
         self.closed = True
@@ -40,9 +40,9 @@ def record(kind, size):
     return bytes([kind, 3, 3]) + size.to_bytes(2, "big") + bytes(size)
 
 
-async def fed(data, *cuts):
-    """A line that has got the data, cut at these places."""
-    line, places = Line(), [0, *sorted(cuts), len(data)]
+async def fed(data, *cuts, machine=""):
+    """A line of a machine that has got the data, cut at these places."""
+    line, places = Line(machine), [0, *sorted(cuts), len(data)]
     for begin, end in pairwise(places):
         line.counted.data_received(data[begin:end])
     return line
@@ -67,6 +67,17 @@ async def test_small_records_are_counted_wherever_they_are_cut(monkeypatch, cut)
     assert not good.closed
     line = await fed(small * 701, *range(cut, 701 * len(small), cut))
     assert line.closed
+
+
+async def test_lines_of_one_machine_count_together():
+    """Each within its own limit, some hundred lines would hold up everybody for seconds."""
+    whole = record(DATA, 0) * int(records.AT_ONCE)
+    lines = [await fed(whole, machine="203.0.113.7") for _ in range(188)]
+    most = int(records.MACHINE_AT_ONCE / records.AT_ONCE)
+    assert [line.closed for line in lines[: most + 1]] == [False] * most + [True]
+    assert sum(len(line.came) for line in lines) <= len(whole) * (most + 1)
+    assert not (await fed(whole, machine="203.0.113.8")).closed
+    assert not any([(await fed(whole)).closed for _ in range(9)])  # this machine's own
 
 
 async def test_large_records_cost_nothing(monkeypatch):

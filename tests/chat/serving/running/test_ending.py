@@ -12,6 +12,7 @@ from ico3d.chat.wire.sentences import ENDING
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
 from support.chat.serving import TYPED, serving, visiting
+from support.waiting import until
 
 pytestmark = pytest.mark.slow
 LONG = Text("nothing you know of, but a long answer")
@@ -81,5 +82,4 @@ async def test_a_page_that_is_away_is_not_waited_for(bundle):
         while sessions.present()[0].page.is_attached:
             await asyncio.sleep(0.01)
         signal.raise_signal(signal.SIGTERM)
-        await asyncio.sleep(0.3)
-        assert len(sessions) == 0
+        await until(lambda: len(sessions) == 0, 5)

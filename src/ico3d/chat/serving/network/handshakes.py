@@ -49,7 +49,7 @@ class Handshake(asyncio.Protocol):
         )
         secured = _under_way(begun)
         deciphers: Any = transport.get_protocol()
-        transport.set_protocol(CountedRecords(transport, deciphers))
+        transport.set_protocol(CountedRecords(transport, deciphers, self._machine))
         self._task = loop.create_task(self._hand_over(transport, secured))
 
     def data_received(self, data: bytes) -> None:
