@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.common.espeak import isolated
 from ico3d.common.espeak.process import process
 from ico3d.common.espeak.speech import synthesize
+from ico3d.common.native import isolated
 from ico3d.errors import ServiceError, SettingsError
 
 pytest.importorskip("espeakng_loader")

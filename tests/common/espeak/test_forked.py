@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from ico3d.common.espeak.forked import forked
-from ico3d.common.espeak.isolated import LostError, RefusedError
+from ico3d.common.native.isolated import LostError, RefusedError
 
 SCRIPT = {
     "answer": lambda: ({"process": os.getpid()}, b"sound"),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ico3d.common.espeak.isolated import LostError, RefusedError, Told
+from ico3d.common.native.isolated import LostError, RefusedError, Told
 
 Answer = Callable[[dict[str, Any]], Told]
 

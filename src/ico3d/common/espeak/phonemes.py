@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ico3d.common.espeak.forked import forked
-from ico3d.common.espeak.isolated import Isolated, LostError, RefusedError, Told, serve
+from ico3d.common.native.isolated import Isolated, LostError, RefusedError, Told, serve
 from ico3d.errors import ServiceError
 
 LONGEST = 10.0  # s for a piece of an answer; it takes milliseconds

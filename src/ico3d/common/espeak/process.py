@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ico3d.common.espeak.isolated import Isolated, RefusedError, Told, serve
+from ico3d.common.native.isolated import Isolated, RefusedError, Told, serve
 
 _SYNCHRONOUS = 2
 _OPTIONS = 0x1 | 0x2 | 0x8000  # phoneme events, in IPA, errors do not end the process

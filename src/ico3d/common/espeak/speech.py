@@ -10,8 +10,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from ico3d.common.espeak.isolated import LostError, RefusedError
 from ico3d.common.espeak.process import Request, ask
+from ico3d.common.native.isolated import LostError, RefusedError
 from ico3d.errors import MissingExtraError, ServiceError, SettingsError
 
 _VOICELESS_STOPS = ("p", "t", "k", "q", "c", "ʈ")

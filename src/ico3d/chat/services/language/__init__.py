@@ -1,6 +1,7 @@
 """Language models: question to answer."""
 
-from ico3d.chat.services.language import local, openai, persona, qwen, smollm
+from ico3d.chat.services.language import local, openai, persona, smollm
+from ico3d.chat.services.language.hub import qwen
 from ico3d.chat.services.provider import Provider, Table
 
 PROVIDERS: Table = {

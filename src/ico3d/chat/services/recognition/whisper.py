@@ -11,6 +11,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.recognition.segments import LONGEST_SPEECH, check_longest_speech
+from ico3d.chat.services.recognition.whisper_files import check_whisper
 from ico3d.common.catalogue.table import TABLE
 from ico3d.common.weights import cached
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
@@ -77,6 +78,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     Raises:
         MissingExtraError: If faster-whisper is not installed.
         MissingModelError: If the weights are not installed.
+        ModelError: If the model's files do not agree with each other.
         SettingsError: If the model cannot be loaded with these options, or does not know the
             language.
     """
@@ -174,12 +176,14 @@ def load(folder: Path, device: str, precision: str) -> Any:
     """Loads a `faster_whisper.WhisperModel`, once per process.
 
     Raises:
+        ModelError: If the folder's files do not agree with each other.
         SettingsError: If the model cannot be loaded with these options.
     """
     from faster_whisper import WhisperModel
 
     from ico3d.chat.services.recognition.short_whisper import ShortWhisper
 
+    check_whisper(folder)
     kind = ShortWhisper if device == "cpu" else WhisperModel  # GPUs do not notice the difference
     # A core is left to voice and turns: threads that wait for each other take longer than fewer.
     threads = max(1, min(MOST_THREADS, (os.cpu_count() or 1) - 1))

@@ -20,8 +20,8 @@ LARGE = 4096  # bytes of a record that costs nothing; a smaller one costs what i
 RATE, AT_ONCE = 300.0, 2000.0
 """Empty records of a second, and at once: a page may send as many messages after a stall."""
 MACHINE_RATE, MACHINE_AT_ONCE = 2000.0, 6000.0
-"""The same of all connections of a machine, 21 µs each where they ask for new keys: forty people who
-speak send as many."""
+"""The same of all connections of a machine, 21 µs each where they ask for new keys. Forty people
+who speak send as many."""
 _machines = Meters(MACHINE_RATE, MACHINE_AT_ONCE, time.monotonic)
 
 

@@ -36,4 +36,8 @@ def thinker(request, tmp_path_factory):
     """A model that thinks aloud, whose thoughts the template may open; gives both facts."""
     thought = "Hmm who asks ◁/think▷"  # all words of a tiny model must differ, marks too
     opening = "" if request.param else "<reasoning>"
-    return made(tmp_path_factory.mktemp("thinker"), opening + thought + ANSWER), request.param
+    folder = made(tmp_path_factory.mktemp("thinker"), opening + thought + ANSWER)
+    if request.param:  # as that of some families does
+        with (folder / "chat_template.jinja").open("a") as template:
+            template.write("{% if add_generation_prompt %}<reasoning>\n{% endif %}")
+    return folder, request.param

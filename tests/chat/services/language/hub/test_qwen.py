@@ -13,7 +13,8 @@ from pipecat.processors.aggregators.llm_context import LLMContext
 from ico3d.bundle.persona import Persona
 from ico3d.chat.remote.headless import run
 from ico3d.chat.services import choose, chosen
-from ico3d.chat.services.language import PROVIDERS, qwen
+from ico3d.chat.services.language import PROVIDERS
+from ico3d.chat.services.language.hub import qwen
 from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings.conversation import ChatSettings, Choice
@@ -33,7 +34,7 @@ def settings_of(folder, **options):
 
 
 async def test_it_answers_aloud_and_is_loaded_once_for_all(bundle, folder):
-    from ico3d.chat.services.language.in_process import load
+    from ico3d.chat.services.language.hub.in_process import load
 
     async with serving(bundle, settings_of(folder)) as (url, _):
         page, welcome = await open_page(url, microphone=False)
@@ -45,13 +46,13 @@ async def test_it_answers_aloud_and_is_loaded_once_for_all(bundle, folder):
         said = [m.text for m in page.messages(Answer) if m.utterance == 1]
         assert said == ["My name is Ada.", "Nice to meet you, dear visitor!"]
         await page.close()
-    assert load(str(folder)) is load(str(folder))
+    assert load(folder) is load(folder)
 
 
 async def test_an_interruption_stops_the_generation(bundle, endless):
-    from ico3d.chat.services.language.in_process import load
+    from ico3d.chat.services.language.hub.in_process import load
 
-    model = load(str(endless)).model
+    model = load(endless).model
     async with serving(bundle, settings_of(endless, max_tokens=3000)) as (url, _):
         page, _ = await open_page(url, microphone=False)
         await page.heard(0)
@@ -82,7 +83,7 @@ class Letters:
 
 def test_what_a_model_reads_is_counted_in_tokens():
     """Nobody can stop it while it reads."""
-    from ico3d.chat.services.language.in_process import (
+    from ico3d.chat.services.language.hub.in_process import (
         LONGEST_MESSAGE,
         MOST_TALK,
         MOST_TOLD,
@@ -91,14 +92,14 @@ def test_what_a_model_reads_is_counted_in_tokens():
 
     talk = [{"role": role, "content": letter * 2000} for role, letter in TALK]
     told = {"role": "system", "content": "!" * 500_000}
-    kept = Loaded("x", None, Letters())._fitting([told, *talk])
+    kept = Loaded(Path("x"), None, Letters(), None, False)._fitting([told, *talk])
     assert [(one["role"], one["content"][0], len(one["content"])) for one in kept] == [
         ("system", "!", MOST_TOLD),
         *((role, letter, LONGEST_MESSAGE) for role, letter in TALK[-3:]),
     ]
     assert MOST_TALK == 4 * LONGEST_MESSAGE  # the answer before these has no question before it
     short = [told | {"content": "Be kind."}, *({"role": r, "content": c} for r, c in TALK)]
-    assert Loaded("x", None, Letters())._fitting(short) == short
+    assert Loaded(Path("x"), None, Letters(), None, False)._fitting(short) == short
 
 
 TALK = [("user", "a"), ("assistant", "b"), ("user", "c"), ("assistant", "d"), ("user", "e")]
@@ -112,9 +113,9 @@ def counted(model):
 
 
 async def test_tokens_stream_and_stop_when_nobody_reads_on(endless):
-    from ico3d.chat.services.language.in_process import load
+    from ico3d.chat.services.language.hub.in_process import load
 
-    loaded = load(str(endless))
+    loaded = load(endless)
     stream = loaded.stream([{"role": "user", "content": "count"}], 2000)
     first = [await anext(stream) for _ in range(4)]
     assert "".join(first).replace(" ", "").startswith("one,two;")
@@ -134,14 +135,14 @@ async def test_summaries_are_inferred_beside_the_conversation(folder, answer):
 
 
 def test_a_failed_generation_ends_its_stream(folder):
-    from ico3d.chat.services.language.in_process import load
+    from ico3d.chat.services.language.hub.in_process import load
 
     async def broken():
-        async for _ in load(str(folder)).stream([{"role": "user"}], 10):  # no content
+        async for _ in load(folder).stream([{"role": "user"}], 10):  # no content
             pass
 
     with pytest.raises(Exception, match="content"):
-        asyncio.run(asyncio.wait_for(broken(), 5))
+        asyncio.run(asyncio.wait_for(broken(), 30))
 
 
 def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch):
@@ -172,13 +173,10 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
 
 
 async def test_its_thoughts_are_not_said(thinker, answer):
-    from ico3d.chat.services.language.in_process import load
+    from ico3d.chat.services.language.hub.in_process import load
 
     folder, opened = thinker
-    if opened:  # by the template, as that of some families does
-        tokenizer = load(str(folder)).tokenizer
-        tokenizer.chat_template += "{% if add_generation_prompt %}<reasoning>\n{% endif %}"
-        assert load(str(folder)).opens
+    assert load(folder).opens is opened
     made = choose(settings_of(folder)).language.make(CONTEXT)
     asked = LLMContextFrame(LLMContext([{"role": "user", "content": "who are you?"}]))
     said = [frame.text async for frame in run(made, [asked], 60) if isinstance(frame, LLMTextFrame)]

@@ -25,8 +25,9 @@ class Settings:
     """Options of the language model `qwen`.
 
     Attributes:
-        model: A folder, or a name on the Hugging Face hub whose files are in its cache; empty for
-            Qwen2-0.5B-Instruct, on CUDA in its AWQ form if installed.
+        model: A folder as a path (`./models/mine`, `/srv/mine`), or a name on the Hugging Face hub
+            whose files are in its cache; empty for Qwen2-0.5B-Instruct, on CUDA in its AWQ form if
+            installed.
         max_tokens: Highest number of tokens of an answer, thoughts included.
         temperature: Temperature of sampling, 0 to 2; the model's own if not given.
     """
@@ -67,42 +68,45 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     for name in PACKAGES:
         if find_spec(name) is None:
             raise MissingExtraError(name, "qwen", "the language model in this process")
-    from ico3d.chat.services.language.in_process import InProcessModel, load, on_cuda
+    from ico3d.chat.services.language.hub.in_process import InProcessModel, load, on_cuda
 
     where = source(settings, on_cuda())
     if where is None:
         raise MissingModelError(
             f"the language model {settings.model or weights_named(PLAIN).repository} is not on "
-            f"this machine: fetch it with `ico3d weights fetch {PLAIN}`, or give its folder as "
-            "'model'."
+            f"this machine: fetch it with `ico3d weights fetch {PLAIN}`, or give the path of its "
+            "folder as 'model', such as ./models/mine."
         )
     return InProcessModel(
         load(where), instruction(context.persona), settings.max_tokens, settings.temperature
     )
 
 
-def source(settings: Settings, cuda: bool) -> str | None:
-    """Folder or hub name of the model; None if its files are not installed."""
-    if settings.model:
-        return settings.model if is_here(settings.model) else None
+def source(settings: Settings, cuda: bool) -> Path | None:
+    """Folder of the model; None if its files are not installed."""
     quantised = [QUANTISED] if cuda and find_spec(KERNELS) else []
     folders = [cached(name) for name in (*quantised, PLAIN)]
-    return next((str(folder) for folder in folders if folder and is_here(str(folder))), None)
+    if settings.model:
+        folders = [_named(settings.model)]
+    return next((folder for folder in folders if folder and _is_whole(folder)), None)
 
 
-def is_here(model: str) -> bool:
-    """Whether a model's files are in its folder or in the Hugging Face cache."""
-    if Path(model).is_dir():
-        return _is_whole({name.name for name in Path(model).iterdir()})
+def _named(model: str) -> Path | None:
+    """The folder of a model that settings name.
+
+    A name on the hub is none of a folder, wherever a server is started.
+    """
+    if model.startswith((".", "~")) or Path(model).is_absolute():
+        return Path(model).expanduser().resolve()
     from huggingface_hub import try_to_load_from_cache
     from huggingface_hub.errors import HFValidationError
 
-    names = ("config.json", *WEIGHTS)
     try:
-        return _is_whole({n for n in names if isinstance(try_to_load_from_cache(model, n), str)})
-    except HFValidationError:  # a path that is no folder
-        return False
+        found = try_to_load_from_cache(model, "config.json")
+    except HFValidationError:  # neither a path nor a name
+        return None
+    return Path(found).parent if isinstance(found, str) else None
 
 
-def _is_whole(names: set[str]) -> bool:
-    return "config.json" in names and not names.isdisjoint(WEIGHTS)
+def _is_whole(folder: Path) -> bool:
+    return (folder / "config.json").is_file() and any((folder / n).is_file() for n in WEIGHTS)

@@ -9,7 +9,8 @@ from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import aclosing
 from dataclasses import dataclass, field
-from functools import cache, cached_property, partial
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 from pipecat.frames.frames import (
@@ -24,27 +25,27 @@ from pipecat.processors.frame_processor import FrameDirection
 from pipecat.services.llm_service import LLMService
 from pipecat.services.settings import LLMSettings
 from pipecat.utils.types import assert_given
-from transformers import (
-    AsyncTextIteratorStreamer,
-    AutoModelForCausalLM,
-    AutoTokenizer,
-    StoppingCriteria,
-    StoppingCriteriaList,
-)
+from transformers import AsyncTextIteratorStreamer, StoppingCriteria, StoppingCriteriaList
 from transformers.utils.import_utils import is_torch_cuda_available
 
 from ico3d.chat.pipecat_internals import check_schema, push_text, settings_of
 from ico3d.chat.services.language.fitting import fitting
+from ico3d.chat.services.language.hub.loading import load_model
+from ico3d.chat.services.language.hub.prompts import Prompts, prompts_of
 from ico3d.chat.services.language.reasoning import (
     Parts,
     Thoughts,
     opens_thoughts,
     without_thoughts,
 )
+from ico3d.common.native.isolated import RefusedError
+from ico3d.errors import ModelError
 
 AT_ONCE = 2  # answers generated side by side; further ones wait
 MOST_TOLD, MOST_TALK, LONGEST_MESSAGE = 3072, 1024, 256
 """Tokens that a model reads of its instruction, of the conversation, and of one message."""
+LONGEST_PROMPT = 2 * (MOST_TOLD + MOST_TALK)
+"""Tokens that a model reads of all of these, and of what its chat template writes about them."""
 _loading = threading.Lock()
 
 
@@ -69,29 +70,22 @@ class Loaded:
     """A model that all sessions share.
 
     Attributes:
-        name: Folder or hub name of the model.
+        folder: Folder of the model.
         model: The causal language model of transformers.
-        tokenizer: The model's tokenizer, with a chat template.
+        tokenizer: The model's tokenizer.
+        prompts: Writes prompts by the model's chat template.
+        opens: Whether the chat template opens a thought, so that answers contain only its end mark.
         threads: Threads that generate.
     """
 
-    name: str
+    folder: Path
     model: Any
     tokenizer: Any
+    prompts: Prompts
+    opens: bool
     threads: ThreadPoolExecutor = field(
         default_factory=lambda: ThreadPoolExecutor(AT_ONCE, "language")
     )
-
-    @cached_property
-    def opens(self) -> bool:
-        """Whether the chat template opens a thought, so that answers contain only its end mark."""
-        try:
-            prompt = self.tokenizer.apply_chat_template(
-                [{"role": "user", "content": "?"}], add_generation_prompt=True, tokenize=False
-            )
-        except Exception:  # a template may want anything; it then says so with the first question
-            return False
-        return opens_thoughts(prompt)
 
     async def stream(
         self, messages: list[dict[str, Any]], most: int, temperature: float | None = None
@@ -124,12 +118,11 @@ class Loaded:
         self, messages: list[dict[str, Any]], how: dict[str, Any], streamer: Any, stop: Stop
     ) -> None:
         try:
-            prompt = self.tokenizer.apply_chat_template(
-                self._fitting(messages),
-                add_generation_prompt=True,
-                return_tensors="pt",
-                return_dict=True,
-            ).to(self.model.device)
+            written = self.prompts.of(self._fitting(messages))
+            prompt = self.tokenizer(written, add_special_tokens=False, return_tensors="pt")
+            prompt = prompt.to(self.model.device)
+            if prompt["input_ids"].shape[1] > LONGEST_PROMPT:
+                raise ModelError(f"its chat template writes more than {LONGEST_PROMPT} tokens.")
             criteria = StoppingCriteriaList([stop])
             self.model.generate(**prompt, **how, streamer=streamer, stopping_criteria=criteria)
         except BaseException:
@@ -167,19 +160,26 @@ def on_cuda() -> bool:
     return is_torch_cuda_available()
 
 
-def load(name: str) -> Loaded:
-    """Loads a model from a folder or the Hugging Face cache; later calls share it."""
+def load(folder: Path) -> Loaded:
+    """Loads a model from its folder; later calls share it.
+
+    Raises:
+        ModelError: If the folder does not hold all of a model.
+    """
     with _loading:
-        return _load(name)
+        return _load(folder)
 
 
 @cache
-def _load(name: str) -> Loaded:
-    """Weights come from safetensors only, and no code from their folder is run."""
-    kept: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
+def _load(folder: Path) -> Loaded:
     how = {"device_map": "cuda", "dtype": "auto"} if on_cuda() else {"dtype": "float32"}
-    model = AutoModelForCausalLM.from_pretrained(name, use_safetensors=True, **how, **kept)
-    return Loaded(name, model.eval(), AutoTokenizer.from_pretrained(name, **kept))
+    model, tokenizer = load_model(folder, **how)
+    prompts = prompts_of(tokenizer)
+    try:
+        opens = opens_thoughts(prompts.of([{"role": "user", "content": "?"}]))
+    except RefusedError:  # a template may want anything; it then says so with the first question
+        opens = False
+    return Loaded(folder, model, tokenizer, prompts, opens)
 
 
 class InProcessModel(LLMService):
@@ -198,7 +198,7 @@ class InProcessModel(LLMService):
         """
         super().__init__(
             settings=LLMSettings(
-                model=loaded.name,
+                model=loaded.folder.name,
                 system_instruction=instruction,
                 temperature=temperature,
                 max_tokens=max_tokens,

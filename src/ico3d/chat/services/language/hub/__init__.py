@@ -1,0 +1,1 @@
+"""Language models of the Hugging Face hub in this process, through transformers."""
