@@ -96,3 +96,13 @@ def test_a_stranger_s_bytes_are_read_as_onnx_alone():
     """At the fifth byte the runtime's other format has its name."""
     with pytest.raises(ModelError, match="protobuf parsing failed"):
         SpeechModel(b"\x32\x10\0\0ORTM" + bytes(80))
+
+
+def test_what_a_graph_is_called_is_said_by_nobody_but_the_error(capfd):
+    """onnxruntime would quote names to the terminal, escapes and all."""
+    node = helper.make_node("Reshape", ["flat", "last"], ["row"], name="a\x1b]0;pwned\x07")
+    rows = helper.make_node("Unsqueeze", ["row", "first"], ["x0"])
+    with pytest.raises(ModelError, match=r"cannot be run within 1024 MiB and 5 s") as refused:
+        SpeechModel(graph([node, rows], 0))
+    assert "pwned" in str(refused.value) and "\x1b" not in str(refused.value)
+    assert capfd.readouterr().err == ""

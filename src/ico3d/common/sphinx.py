@@ -9,6 +9,7 @@ the first 0.7 s of a sentence would block everything else for about 0.2 s.
 # (pocketsphinx is untyped)
 
 import asyncio
+import os
 import signal
 import struct
 import sys
@@ -114,4 +115,7 @@ def serve(asked: BinaryIO, told: BinaryIO) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it ends it
-    serve(sys.stdin.buffer, sys.stdout.buffer)
+    try:
+        serve(sys.stdin.buffer, sys.stdout.buffer)
+    except BrokenPipeError:
+        os._exit(0)  # whoever asked is gone, and Python would say so

@@ -269,8 +269,8 @@ def _add_making(app: FastAPI, room: Room) -> None:
         how = str(form.get("quality")), form.get("anew") is True
         person = room.people.person(name)
         async with room.lock(name):
+            await asyncio.to_thread(room.makers.begin, person, *how)  # unless it is refused
             await asyncio.to_thread(room.talks.stop, person.name)
-            await asyncio.to_thread(room.makers.begin, person, *how)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.delete(making)

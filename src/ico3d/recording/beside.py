@@ -16,7 +16,7 @@ from typing import IO
 FULL_DISK = 74
 """Exit status of a process that ends because the disk is full, and may not be able to note it."""
 PATIENCE = 5.0
-"""Seconds in which a process may end by itself before it is killed."""
+"""Seconds in which most processes may end by themselves."""
 
 
 def end_with_parent() -> None:
@@ -56,15 +56,19 @@ def start(
     )
 
 
-def stop(process: subprocess.Popen[bytes]) -> None:
+def stop(process: subprocess.Popen[bytes], patience: float = PATIENCE) -> None:
     """Ends a process and all that it started; returns when it is gone.
 
     Its output stays open for whoever reads it, perhaps in another thread, and closes it.
+
+    Args:
+        process: What `start` has started.
+        patience: Seconds in which it may end by itself before it is killed.
     """
     if process.poll() is None:
         try:
             os.killpg(process.pid, signal.SIGTERM)
-            process.wait(PATIENCE)
+            process.wait(patience)
         except (ProcessLookupError, subprocess.TimeoutExpired):
             process.kill()
         process.wait()

@@ -25,6 +25,7 @@ MOST_MEMORY = 1 << 30  # bytes that the graphs of bundles may take while they ru
 MOST_SECONDS = 5.0  # that a run of a bundle's graph may take longer than its sound lasts
 AT_ONCE = 30.0  # s of a whole sound, whose rows are computed together
 
+SILENT = 4  # severity; what onnxruntime says beside its errors quotes the names of a file
 BEFORE, AFTER = 4, 3  # rows that the attention sees around each: [i − 4, i + 4)
 TOLD = "told"
 """Input of a graph for what is known of the lips' articulation; not all graphs have it."""
@@ -106,23 +107,23 @@ class SpeechModel:
             told: (T, 6) what is known of the articulation (`TimedPhonemes.rows`); None for nothing.
 
         Raises:
-            Exception: If the graph cannot be run, or takes too long.
+            ModelError: If the graph cannot be run, or takes too long or too much memory.
         """
         given = {self._input: rows}
         if told is not None and self.takes_phonemes:
             given[TOLD] = told
-        return _within(MOST_SECONDS + len(rows) / FPS, self._model, given)
-
-    def _tried(self, rows: np.ndarray) -> np.ndarray:
-        """The first run, which shows whether a stranger's graph can be run at all."""
         try:
-            found = self.run(rows)
+            return _within(MOST_SECONDS + len(rows) / FPS, self._model, given)
         except Exception as error:  # onnxruntime's have no common class
             why = str(error).strip().rstrip(".")[:200]
             raise ModelError(
                 f"speech.onnx cannot be run within {MOST_MEMORY >> 20} MiB "
                 f"and {MOST_SECONDS:g} s: {why}."
             ) from None
+
+    def _tried(self, rows: np.ndarray) -> np.ndarray:
+        """The first run, which shows whether a stranger's graph can be run at all."""
+        found = self.run(rows)
         if found.shape != (len(rows), SPEECH_SIZE):
             raise ModelError(f"speech.onnx gives {found.shape[-1]} values, not {SPEECH_SIZE}.")
         return found
@@ -301,6 +302,7 @@ def _within(seconds: float, session: Any, given: dict[str, np.ndarray]) -> np.nd
     import onnxruntime
 
     options = onnxruntime.RunOptions()
+    options.log_severity_level = SILENT
     timer = Timer(seconds, setattr, (options, "terminate", True))
     timer.daemon = True
     timer.start()
@@ -338,7 +340,7 @@ def _session(
         raise MissingExtraError("onnxruntime", "chat", "speech-driven expressions") from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 0 if heavy else 1
-    options.log_severity_level = 3
+    options.log_severity_level = SILENT
     # constants are folded while a file is opened, outside of the bound
     left_out = ["ConstantFolding"] if bounded else []
     if bounded:

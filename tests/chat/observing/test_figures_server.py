@@ -21,11 +21,22 @@ def test_silent_connections_are_closed_and_few(monkeypatch):
     Counter("ico3d_visitors", "Visitors.", registry=registry).inc(7)
     port = figures_server.serve_figures(registry, "127.0.0.1", 0)
     silent = [_silent(port) for _ in range(3)]
-    assert [one.recv(1) for one in reversed(silent)] == [b""] * 3
+    assert [one.recv(1) for one in silent] == [b""] * 3
     for one in silent:
         one.close()
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
         assert b"ico3d_visitors_total 7.0" in answer.read()
+
+
+def test_whoever_keeps_renewing_silent_connections_keeps_nobody_out(monkeypatch):
+    monkeypatch.setattr(figures_server, "MOST_AT_ONCE", 3)
+    port = figures_server.serve_figures(CollectorRegistry(), "127.0.0.1", 0)
+    silent = []
+    for _ in range(5):
+        silent += [_silent(port) for _ in range(5)]
+        assert _answer(port, b"GET /metrics HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.0 200")
+    for one in silent:
+        one.close()
 
 
 def test_a_request_that_comes_letter_by_letter_ends_in_time(monkeypatch):

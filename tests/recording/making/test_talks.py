@@ -2,6 +2,8 @@
 
 import os
 import sys
+import threading
+import time
 
 import pytest
 
@@ -29,6 +31,27 @@ def test_an_avatar_has_one_server_until_it_is_stopped(avatar):
     (process, _) = serving._running["Ida"]
     serving.close()
     assert process.poll() is not None
+
+
+def test_a_talk_that_speaks_on_is_ended_and_holds_up_nobody(avatar, monkeypatch):
+    serving, slow = Talks("127.0.0.1", False), avatar.with_name("Slow.ico3d")
+    slow.write_text("Stubborn")
+    serving.url(slow)
+    url = serving.url(avatar)
+    (process, _) = serving._running["Slow"]
+    monkeypatch.setattr(talks, "PATIENCE", 20.0)
+    ending = threading.Thread(target=serving.stop, args=["Slow"], daemon=True)
+    ending.start()
+    while "Slow" in serving._running:
+        time.sleep(0.01)
+    assert serving.url(avatar) == url and process.poll() is None
+    monkeypatch.setattr(talks, "PATIENCE", 0.2)
+    serving.url(slow)
+    (second, _) = serving._running["Slow"]
+    serving.close()
+    assert second.poll() is not None and process.poll() is None
+    process.kill()
+    ending.join()
 
 
 def test_a_name_is_no_address(avatar):

@@ -1,6 +1,10 @@
-"""A server of an avatar that waits until it is ended; of an empty file it does not start."""
+"""A server of an avatar that waits until it is ended; of an empty file it does not start.
+
+That of an avatar called Stubborn speaks on for a while.
+"""
 
 import os
+import signal
 import sys
 import threading
 from pathlib import Path
@@ -14,5 +18,7 @@ if __name__ == "__main__":
     if not name:
         sys.exit(1)
     assert scheme == "plain"
+    if name == "Stubborn":
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
     print(f"{name} is at http://{host}:{os.getpid()}/#key=a-b (Ctrl+C ends)", flush=True)
     threading.Event().wait()

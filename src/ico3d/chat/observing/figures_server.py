@@ -16,7 +16,9 @@ LONGEST = 20.0
 LONGEST_HEAD = 16_384
 """Bytes of a request."""
 MOST_AT_ONCE = 16
-"""Connections at the same time, each of which takes a thread."""
+"""Connections at the same time, each of which takes a thread; the oldest gives way to a new one."""
+GIVING_WAY = 1.0
+"""Seconds that this may take."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -68,15 +70,22 @@ class _Head(io.RawIOBase):
 
 
 class _Server(ThreadingHTTPServer):
-    """A thread for each connection, up to `MOST_AT_ONCE`; further ones are closed."""
+    """A thread for each connection, up to `MOST_AT_ONCE`."""
 
     def __init__(self, *arguments: Any, **options: Any):
         self._places = threading.BoundedSemaphore(MOST_AT_ONCE)
+        self._open: dict[socket.socket, None] = {}  # the oldest first
         super().__init__(*arguments, **options)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Begins to answer, where there is a place."""
-        if self._places.acquire(blocking=False):
+        """Begins to answer; whoever has kept a place for longest loses it, if there is none."""
+        place = self._places.acquire(blocking=False)
+        if not place:
+            for oldest in list(self._open)[:1]:
+                _end(oldest)
+            place = self._places.acquire(timeout=GIVING_WAY)
+        if place:
+            self._open[request] = None
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
@@ -90,6 +99,7 @@ class _Server(ThreadingHTTPServer):
             super().process_request_thread(request, client_address)
         finally:
             end.cancel()
+            self._open.pop(request, None)
             self._places.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:

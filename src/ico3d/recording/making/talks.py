@@ -10,6 +10,8 @@ from ico3d.recording.beside import start, stop
 from ico3d.recording.refusals import Refused
 
 TALK = "ico3d.recording.making.talk"
+PATIENCE = 0.5
+"""Seconds in which a talk may end by itself: the sentence at hand would take longer."""
 
 
 class Talks:
@@ -44,8 +46,8 @@ class Talks:
         """Ends the server of somebody's avatar, if there is one."""
         with self._lock:
             process, _ = self._running.pop(name, (None, ""))
-            if process is not None:
-                stop(process)
+        if process is not None:  # others need not wait until it is gone
+            stop(process, PATIENCE)
 
     def close(self) -> None:
         """Ends all servers."""
