@@ -21,7 +21,7 @@ from ico3d.errors import Ico3dError, MissingModelError
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
 from support.chat.serving import OFFLINE, TYPED, free_port, serving
-from support.waiting import until
+from support.chat.waiting import until
 
 pytestmark = pytest.mark.slow
 

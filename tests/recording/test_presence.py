@@ -10,9 +10,9 @@ from ico3d.chat.serving.sites import Sites
 from ico3d.recording import app as studio
 from ico3d.recording.guiding.looking import MOST_AT_ONCE
 from support.chat.serving import running
+from support.chat.waiting import until
 from support.needs import needs
 from support.studio_page.parts import begun, part_file
-from support.waiting import until
 
 pytestmark = [needs("av"), pytest.mark.slow]
 REPORT = {"seconds": 1.0, "turn": None, "advice": []}

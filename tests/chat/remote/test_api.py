@@ -28,7 +28,7 @@ from support.chat.remote import (
     serving,
 )
 from support.chat.serving import visiting
-from support.waiting import until
+from support.chat.waiting import until
 
 pytestmark = pytest.mark.slow
 

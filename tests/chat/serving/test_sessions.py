@@ -29,7 +29,7 @@ from ico3d.chat.wire.protocol import (
 from ico3d.chat.wire.sentences import FULL
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import TYPED, serving
-from support.waiting import until
+from support.chat.waiting import until
 
 pytestmark = pytest.mark.slow
 

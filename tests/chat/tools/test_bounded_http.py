@@ -13,7 +13,7 @@ from ico3d.chat.services.bounded import Limits
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools.mcp import Connection
 from support.chat.scripted_server import running
-from support.waiting import until
+from support.chat.waiting import until
 
 httpx2 = pytest.importorskip("httpx2")
 NO_METHOD = {"code": -32601, "message": "no such method"}

@@ -8,7 +8,7 @@ import pytest
 
 from ico3d.chat.serving.network import handshakes, prompt
 from support.chat.serving import visiting
-from support.waiting import until
+from support.chat.waiting import until
 
 
 async def is_closed(reader, seconds):

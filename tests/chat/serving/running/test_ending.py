@@ -12,7 +12,7 @@ from ico3d.chat.wire.sentences import ENDING
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
 from support.chat.serving import TYPED, serving, visiting
-from support.waiting import until
+from support.chat.waiting import until
 
 pytestmark = pytest.mark.slow
 LONG = Text("nothing you know of, but a long answer")
