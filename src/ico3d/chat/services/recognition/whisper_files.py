@@ -178,7 +178,7 @@ def _shape_of(
     middle = 0
     if part.startswith("ffn"):
         middle = variables[f"{name.rsplit('/', 2)[0]}/linear_0/weight"].shape[0]
-    shape = _LAYERS[part](*sizes, middle)
+    shape = _LAYERS[part](sizes[0], width, sizes[2], middle)
     return (shape,) if what == "weight" else ((shape[0],),)
 
 
