@@ -4,11 +4,15 @@ import contextlib
 import ipaddress
 from collections import Counter
 from collections.abc import Callable, Generator
+from typing import Any
 
 from ico3d.chat.supervision.allowance import Bucket
 
 MOST_SOCKETS = 64
 """Open WebSockets of one machine; a classroom or an office may share its address."""
+GONE = "ico3d.gone"
+"""Name of the future in a WebSocket's scope that is done once its connection is lost: what the
+server has closed waits for its client's answer, and takes as much memory meanwhile."""
 REMEMBERED = 4096  # machines whose use is counted
 UNKNOWN = "unknown"
 """All machines for which a proxy states something that is no address."""
@@ -71,6 +75,17 @@ class Meters:
     def take(self, machine: str) -> bool:
         """Counts one act of a machine; returns whether it is allowed."""
         return all(bucket.take(1) for bucket in self.of(machine))
+
+
+def peer_of(client: tuple[str, int] | None, app: Any) -> str:
+    """The machine at the other end of a connection; empty for proxies that the operator has stated.
+
+    Args:
+        client: Its address and port.
+        app: What is served.
+    """
+    proxies = getattr(app, "trusted_hosts", ())
+    return "" if client and client[0] in proxies else machine_of(client)
 
 
 def machine_of(client: tuple[str, int] | None) -> str:

@@ -5,15 +5,16 @@ Host. If an attacker lets a name point to this machine, that name appears in Hos
 embed the avatar are exceptions (`sites.py`).
 """
 
+import contextlib
 import ipaddress
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ico3d.chat.serving.crowd import Crowd, machine_of
+from ico3d.chat.serving.crowd import GONE, Crowd, machine_of
 from ico3d.chat.serving.refusals import Refusals
 from ico3d.chat.serving.sites import Sites
 
@@ -113,7 +114,10 @@ class Guard:
         if scope["type"] == "http":
             await self._app(scope, receive, with_headers)
             return
-        with self._crowd.one_more(machine_of(scope.get("client"))) as may:
+        with contextlib.ExitStack() as place:
+            may = place.enter_context(self._crowd.one_more(machine_of(scope.get("client"))))
+            if GONE in scope:
+                scope[GONE].add_done_callback(_left(place.pop_all()))
             if may:
                 await self._app(scope, receive, with_headers)
             else:
@@ -127,6 +131,11 @@ class Guard:
             await send({"type": "websocket.close", "code": 1008})  # before accepting: HTTP 403
             return
         await PlainTextResponse(sentence, status)(scope, receive, send)
+
+
+def _left(place: contextlib.ExitStack) -> Callable[[object], None]:
+    """What gives a place back once its connection is gone."""
+    return lambda _: place.close()
 
 
 def is_own(host: str | None, origin: str | None, bound: str, names: Collection[str] = ()) -> bool:

@@ -6,7 +6,8 @@ import ssl
 
 import pytest
 
-from ico3d.chat.serving.network import handshakes, prompt
+from ico3d.chat.serving import crowd
+from ico3d.chat.serving.network import prompt
 from support.chat.serving import visiting
 from support.chat.waiting import until
 
@@ -25,8 +26,7 @@ async def health(port, trust):
 async def test_handshakes_count_as_connections_of_their_machine(secured, monkeypatch):
     port, trust = secured
     monkeypatch.setattr(prompt, "MOST_OPEN", 3)
-    for module in (prompt, handshakes):
-        monkeypatch.setattr(module, "machine_of", lambda client: client and "10.0.0.7")
+    monkeypatch.setattr(crowd, "machine_of", lambda client: client and "10.0.0.7")
     lines = [await asyncio.open_connection("127.0.0.1", port) for _ in range(5)]
     assert await is_closed(lines[3][0], 5) and await is_closed(lines[4][0], 5)
     for _, writer in lines[:2]:

@@ -12,6 +12,7 @@ from fastapi.responses import FileResponse
 from websockets.server import ServerProtocol
 
 import ico3d
+from ico3d.chat.serving import crowd
 from ico3d.chat.serving.network import prompt
 from support.chat.serving import running, serving
 
@@ -310,7 +311,7 @@ async def test_a_slow_but_honest_client_is_answered(port):
 
 async def test_one_machine_opens_so_many_connections_and_no_more(port, monkeypatch):
     monkeypatch.setattr(prompt, "MOST_OPEN", 3)
-    monkeypatch.setattr(prompt, "machine_of", lambda client: client and "10.0.0.7")
+    monkeypatch.setattr(crowd, "machine_of", lambda client: client and "10.0.0.7")
     async with contextlib.AsyncExitStack() as held:
         lines = [await held.enter_async_context(connected(port)) for _ in range(4)]
         assert await seconds_until_closed(lines[3][0]) < 1

@@ -5,12 +5,15 @@ import contextlib
 import ssl
 from itertools import pairwise
 from types import SimpleNamespace
+from unittest import mock
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ico3d.chat.serving.network import records
+from ico3d.chat.serving.crowd import Meters, peer_of
+from ico3d.chat.serving.network import prompt, records
+from ico3d.chat.serving.network.handshakes import Handshake
 from ico3d.chat.serving.network.records import CHANGE_CIPHER, HANDSHAKE, CountedRecords
 
 DATA = 23
@@ -69,15 +72,31 @@ async def test_small_records_are_counted_wherever_they_are_cut(monkeypatch, cut)
     assert line.closed
 
 
-async def test_lines_of_one_machine_count_together():
+async def test_lines_of_one_machine_count_together(monkeypatch):
     """Each within its own limit, some hundred lines would hold up everybody for seconds."""
+    monkeypatch.setattr(records, "_machines", Meters(0.0, records.MACHINE_AT_ONCE, lambda: 0.0))
     whole = record(DATA, 0) * int(records.AT_ONCE)
     lines = [await fed(whole, machine="203.0.113.7") for _ in range(188)]
-    most = int(records.MACHINE_AT_ONCE / records.AT_ONCE)
-    assert [line.closed for line in lines[: most + 1]] == [False] * most + [True]
+    each = records.AT_ONCE - records.STEADY_AT_ONCE
+    most = int(records.MACHINE_AT_ONCE / each)
+    assert [line.closed for line in lines[: most + 2]] == [False] * most + [True] * 2
     assert sum(len(line.came) for line in lines) <= len(whole) * (most + 1)
     assert not (await fed(whole, machine="203.0.113.8")).closed
     assert not any([(await fed(whole)).closed for _ in range(9)])  # this machine's own
+    # who speaks and no more is not cut off by others at the same address
+    assert not (await fed(record(DATA, 0) * 60, machine="203.0.113.7")).closed
+
+
+async def test_lines_through_a_stated_proxy_do_not_count_together():
+    app = SimpleNamespace(trusted_hosts={"203.0.113.9"})
+    assert peer_of(("203.0.113.9", 4), app) == ""
+    assert peer_of(("203.0.113.7", 4), app) == "203.0.113.7"
+    config = SimpleNamespace(loaded_app=app)
+    line, transport = Handshake(config=config), mock.Mock()
+    transport.get_extra_info.return_value = ("203.0.113.9", 4)
+    with mock.patch.object(prompt, "count_in", return_value=False) as counted:
+        line.connection_made(transport)
+    counted.assert_called_once_with("")
 
 
 async def test_large_records_cost_nothing(monkeypatch):

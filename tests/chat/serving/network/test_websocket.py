@@ -9,9 +9,12 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import Frame, Opcode
 
+from ico3d.chat.serving.crowd import GONE, Crowd
+from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.network import websocket
 from ico3d.chat.wire.protocol import MAX_BURST, MAX_RATE
 from support.chat.serving import running
+from support.chat.waiting import until
 
 HEAD = (
     b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -219,3 +222,43 @@ async def test_a_head_that_websockets_does_not_read_is_not_waited_with(served):
         assert await asyncio.wait_for(reader.read(), 5) == b""
     writer.close()
     assert not served.went.is_set()
+
+
+async def test_what_the_server_has_closed_counts_until_it_is_gone(served, monkeypatch):
+    """Whoever does not answer that the line is closed holds it no longer than others wait."""
+    monkeypatch.setattr(websocket, "peer_of", lambda client, app: "203.0.113.7")
+    monkeypatch.setattr(websocket, "_lines", Crowd(3))
+
+    async def close(socket):
+        await socket.close(1008)
+
+    served.page, count = close, websocket._lines._open
+    lines = [await asyncio.open_connection("127.0.0.1", served.port) for _ in range(5)]
+    for _, writer in lines:
+        writer.write(HEAD + b"\r\n")
+    await until(lambda: sum(count.values()) == 3)
+    begun = asyncio.get_running_loop().time()
+    for reader, _ in lines:
+        with contextlib.suppress(ConnectionError):
+            await asyncio.wait_for(reader.read(), 30)
+    assert asyncio.get_running_loop().time() - begun < websocket.FAREWELL + 5
+    await until(lambda: not count)
+    for _, writer in lines:
+        writer.close()
+
+
+async def test_a_place_in_the_crowd_is_kept_until_the_line_is_gone():
+    gone, crowd = asyncio.get_running_loop().create_future(), Crowd()
+
+    async def app(scope, receive, send):
+        return None
+
+    guard = Guard(app, "127.0.0.1")
+    guard._crowd = crowd
+    headers = [(b"host", b"127.0.0.1:80")]
+    scope = {"type": "websocket", "path": "/echo", "headers": headers, "query_string": b""}
+    await guard({**scope, "client": ("203.0.113.7", 9), GONE: gone}, None, None)
+    assert crowd._open["203.0.113.7"] == 1
+    gone.set_result(None)
+    await asyncio.sleep(0)
+    assert not crowd._open

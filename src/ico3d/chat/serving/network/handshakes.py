@@ -10,7 +10,7 @@ import types
 from collections.abc import Coroutine, Generator
 from typing import Any
 
-from ico3d.chat.serving.crowd import machine_of
+from ico3d.chat.serving.crowd import peer_of
 from ico3d.chat.serving.network import prompt
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.network.records import CountedRecords
@@ -39,7 +39,8 @@ class Handshake(asyncio.Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begins the handshake, unless the machine has too many connections."""
         client = transport.get_extra_info("peername")
-        self._machine, self._counted = machine_of(client), True
+        self._machine = peer_of(client, self._served["config"].loaded_app)
+        self._counted = True
         if not prompt.count_in(self._machine):
             transport.abort()
             return

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
-from ico3d.chat.serving.crowd import machine_of
+from ico3d.chat.serving.crowd import peer_of
 from ico3d.errors import ProtocolError
 
 HEAD = 10.0  # s for the head of a request
@@ -53,8 +53,7 @@ class PromptProtocol(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Opens the connection, or closes it if its machine has too many."""
         super().connection_made(transport)
-        proxies = getattr(self.app, "trusted_hosts", ())
-        self._machine = "" if self.client and self.client[0] in proxies else machine_of(self.client)
+        self._machine = peer_of(self.client, self.app)
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None

@@ -22,6 +22,9 @@ RATE, AT_ONCE = 300.0, 2000.0
 MACHINE_RATE, MACHINE_AT_ONCE = 2000.0, 6000.0
 """The same of all connections of a machine, 21 µs each where they ask for new keys. Forty people
 who speak send as many."""
+STEADY, STEADY_AT_ONCE = 40.0, 64.0
+"""Those of a connection that are not counted among its machine's: as many as somebody sends who
+speaks. So nobody cuts off those who share an address."""
 _machines = Meters(MACHINE_RATE, MACHINE_AT_ONCE, time.monotonic)
 
 
@@ -42,8 +45,9 @@ class CountedRecords(asyncio.Protocol):
             machine: What `machine_of` returned: all its connections count together.
         """
         self._transport, self._secured = transport, secured
-        own = Bucket(RATE, AT_ONCE, asyncio.get_running_loop().time)
-        self._allowed = (own, *_machines.of(machine))
+        now = asyncio.get_running_loop().time
+        self._own, self._steady = Bucket(RATE, AT_ONCE, now), Bucket(STEADY, STEADY_AT_ONCE, now)
+        self._shared = _machines.of(machine)
         self._head = b""  # of a record whose head has come in part
         self._left = 0  # bytes of a record whose body has come in part
         self._handshakes, self._handshake_bytes, self._finished = 0, 0, False
@@ -90,7 +94,9 @@ class CountedRecords(asyncio.Protocol):
                 break
             self._head, size = b"", int.from_bytes(head[3:5], "big")
             cost = max(0.0, 1 - size / LARGE)
-            if not all(bucket.take(cost) for bucket in self._allowed):
+            if not self._own.take(cost):
+                return False
+            if not (self._steady.take(cost) or all(one.take(cost) for one in self._shared)):
                 return False
             if not self._is_in_turn(head[0], size):
                 return False

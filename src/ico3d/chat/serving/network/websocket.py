@@ -5,11 +5,13 @@ read although nobody takes the messages, and waits for ever until a peer has rea
 """
 
 import asyncio
+import contextlib
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 
+from ico3d.chat.serving.crowd import GONE, MOST_SOCKETS, Crowd, peer_of
 from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import MAX_BURST, MAX_RATE
 
@@ -19,7 +21,13 @@ RATE, AT_ONCE = MAX_RATE, 2 * MAX_BURST
 LARGEST_BACKLOG = 1 << 20  # bytes that a peer may leave unread
 LAST_WORDS = 5.0  # s in which a peer may read what was sent before the connection was closed
 LATE = 1 << 12  # bytes that are parsed after the last word, which may have crossed them
+FAREWELL = 2.0  # s in which a peer may answer that the connection is closed, or read a refusal
 PARTING = 0.2  # s in which one that broke the rules may read why
+
+
+_lines = Crowd(2 * MOST_SOCKETS)
+"""Connections of each machine that are WebSockets, those that are refused or closed included until
+they are gone."""
 
 
 class BoundedWebSocket(WebSocketsSansIOProtocol):
@@ -28,21 +36,30 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
     def __init__(self, *given: Any, **named: Any):
         """Takes what uvicorn gives to a connection."""
         super().__init__(*given, **named)
+        self.close_timeout = FAREWELL
+        self._place, self._gone = contextlib.ExitStack(), self.loop.create_future()
         self._allowed = Bucket(RATE, AT_ONCE, self.loop.time)
         self._unparsed = memoryview(b"")  # came with messages that are not taken yet
         self._look: asyncio.TimerHandle | None = None
+        self._farewell: asyncio.TimerHandle | None = None
         self._late = 0  # bytes that were parsed after the last word
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Opens the connection."""
+        """Opens the connection, or closes it if its machine has too many."""
         super().connection_made(transport)
         self._look_later(closing=False)
+        if not self._place.enter_context(_lines.one_more(peer_of(self.client, self.app))):
+            self.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forgets the connection."""
         if self._look is not None:
             self._look.cancel()
         self._unparsed, self.frames = memoryview(b""), []
+        if self._farewell is not None:
+            self._farewell.cancel()
+        self._place.close()
+        self._gone.set_result(None)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -51,6 +68,13 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
             return
         self._unparsed = memoryview(bytes(self._unparsed) + data if self._unparsed else data)
         self._parse()
+
+    async def run_asgi(self) -> None:
+        """Serves the connection, which is ended a while after it was closed or refused."""
+        self.scope[GONE] = self._gone
+        await super().run_asgi()
+        if not self._gone.done():  # else nothing would let go of it meanwhile
+            self._farewell = self.loop.call_later(FAREWELL, self._end_if_read)
 
     async def receive(self) -> Any:
         """Returns the next message or the end of the connection."""
@@ -90,6 +114,8 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         """Parses what has come, until there is a message."""
         while self._unparsed and not self.read_paused and not self.transport.is_closing():
             piece, self._unparsed = self._unparsed[:SLICE], self._unparsed[SLICE:]
+            if not self._unparsed:
+                self._unparsed = memoryview(b"")  # a view of nothing would keep all that came
             if self.close_sent:
                 self._count_late(len(piece))
             super().data_received(bytes(piece))
@@ -122,6 +148,11 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
         )
         self.handle_parser_exception()
         return False
+
+    def _end_if_read(self) -> None:
+        """Ends a connection whose peer has read the last word, and does not answer it."""
+        if not self.transport.get_write_buffer_size():
+            self.transport.abort()
 
     def _look_later(self, closing: bool) -> None:
         self._look = self.loop.call_later(LAST_WORDS, self._end_if_left, closing)
