@@ -10,10 +10,17 @@ from ico3d.bundle.people.provenance import (
     OPENVOICE,
     ClonedVoice,
     Provenance,
+    check_texts,
     provenance_to_json,
     with_newer,
 )
-from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
+from ico3d.bundle.persona import (
+    LONGEST_NAME,
+    Persona,
+    check_persona,
+    with_defaults,
+    without_defaults,
+)
 from ico3d.bundle.skinned.info import SkinnedInfo, check_skinned
 from ico3d.bundle.windows.info import BodyInfo, check_body
 from ico3d.common.expression import MOST_DISPLACEMENTS
@@ -227,7 +234,9 @@ def check_manifest(manifest: Manifest) -> None:
     _check_speech(manifest)
     _check_camera(manifest.camera)
     _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
+    _require(len(manifest.name) <= LONGEST_NAME, "name", f"have at most {LONGEST_NAME} letters")
     check_persona(manifest.persona, MANIFEST)
+    check_texts(manifest.provenance)
     if manifest.provenance.voice is not None:
         _check_voice(manifest.provenance.voice)
     for name, entry in manifest.files.items():

@@ -13,6 +13,7 @@ import {
   OLDEST_BUNDLE,
   SMALLER,
 } from '../shared.ts';
+import { badText } from './texts.ts';
 
 /** Where the visitor starts, world space. */
 export interface StartCamera {
@@ -134,7 +135,9 @@ export function checkManifest(value: unknown): Manifest {
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
-  checkProvenance(manifest.provenance);
+  if (!manifest.provenance?.sources) bad('provenance.sources');
+  const text = badText(manifest);
+  if (text) bad(text);
   return { ...manifest, head, body, skinned };
 }
 
@@ -150,19 +153,6 @@ function checkFiles(files: Manifest['files']): void {
 }
 
 /** Texts go onto the page. */
-function checkProvenance(provenance: Provenance): void {
-  for (const key of ['kind', 'consent', 'licence'] as const) if (typeof provenance?.[key] !== 'string') bad(`provenance.${key}`);
-  const { sources } = provenance;
-  if (!Array.isArray(sources) || !sources.every((source) => typeof source === 'string')) bad('provenance.sources');
-  for (const key of ['likeness', 'made_by', 'made_on'] as const) {
-    if (!['string', 'undefined'].includes(typeof provenance[key])) bad(`provenance.${key}`);
-  }
-  const { voice } = provenance;
-  for (const key of ['recording', 'consent'] as const) {
-    if (voice && typeof voice[key] !== 'string') bad(`provenance.voice.${key}`);
-  }
-}
-
 /** Whether the avatar is nobody's likeness. */
 export function isSynthetic({ kind }: { kind: string }): boolean {
   return kind === 'synthetic';

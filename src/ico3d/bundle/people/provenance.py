@@ -1,5 +1,6 @@
 """Where an avatar comes from: whose likeness it is, who agreed, who made it of what."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -12,6 +13,9 @@ SYNTHETIC = "synthetic"
 """Kind of a recording that shows nobody: the person was modelled, and filmed inside a computer."""
 OPENVOICE = "openvoice-v2"
 """The engine of cloned voices."""
+LONGEST_TEXT, MOST_SOURCES, MOST_PARTS = 4_000, 1_000, 16
+"""Letters of each text, and numbers of entries; pages allow as much (`viewer/src/bundle/texts.ts`).
+"""
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,33 @@ def _with_look(part: Any) -> Any:
     """Adds to the parsed JSON of a part what is not said of those that are as recorded."""
     unsaid = {"build": "", "outfit": ""}
     return unsaid | cast(dict[str, Any], part) if isinstance(part, dict) else part
+
+
+def check_texts(provenance: Provenance) -> None:
+    """Checks that all texts are as long as a page can show.
+
+    Raises:
+        BundleError: If one is longer, or there are too many.
+    """
+    told = plain(provenance)
+    few = len(provenance.sources) <= MOST_SOURCES and len(provenance.parts) <= MOST_PARTS
+    if not few or any(len(text) > LONGEST_TEXT for text in _texts(told)):
+        raise BundleError(
+            f"manifest.json: provenance must have at most {MOST_SOURCES} sources, {MOST_PARTS} "
+            f"parts, and texts of at most {LONGEST_TEXT} letters."
+        )
+
+
+def _texts(told: Any) -> Iterator[str]:
+    """All texts of what JSON can hold."""
+    if isinstance(told, str):
+        yield told
+    elif isinstance(told, dict):
+        for value in cast(dict[str, Any], told).values():
+            yield from _texts(value)
+    elif isinstance(told, list | tuple):
+        for value in cast(list[Any], told):
+            yield from _texts(value)
 
 
 def check_consent(provenance: Provenance, path: Path | str) -> None:
