@@ -13,7 +13,7 @@ import {
   OLDEST_BUNDLE,
   SMALLER,
 } from '../shared.ts';
-import { badText } from './texts.ts';
+import { badText, type Persona, type Provenance } from './texts.ts';
 
 /** Where the visitor starts, world space. */
 export interface StartCamera {
@@ -74,28 +74,6 @@ export interface SkinnedInfo {
   num_rest: number; // of the Gaussians, in a file of their own
 }
 
-/** Whose the head or the body is, where they come from different people. */
-export interface Part {
-  name: 'head' | 'body';
-  kind: string; // of the recordings
-  likeness: string;
-  build?: string; // of a body that was changed, else as recorded
-  outfit?: string; // likewise
-}
-
-/** Whose likeness the avatar is, who agreed, who made it of what; older bundles lack the optional entries. */
-export interface Provenance {
-  kind: string; // of the recordings
-  sources: string[];
-  consent: string;
-  licence: string;
-  likeness?: string;
-  made_by?: string;
-  made_on?: string; // a day such as 2026-11-24
-  parts?: Part[];
-  voice?: { recording: string; consent: string }; // cloned for the avatar
-}
-
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
 export interface Manifest {
   name: string;
@@ -105,7 +83,7 @@ export interface Manifest {
   skinned: SkinnedInfo | null; // or on a skeleton
   camera: StartCamera;
   background: [number, number, number];
-  persona: { name: string; greeting: string; languages?: readonly string[]; suggestions?: readonly string[] };
+  persona: Persona;
   provenance: Provenance;
 }
 
@@ -135,7 +113,6 @@ export function checkManifest(value: unknown): Manifest {
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
-  if (!manifest.provenance?.sources) bad('provenance.sources');
   const text = badText(manifest);
   if (text) bad(text);
   return { ...manifest, head, body, skinned };

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import type { Provenance } from '../../src/bundle/manifest.ts';
+import type { Provenance } from '../../src/bundle/texts.ts';
 import { rowsOf } from '../../src/ui/sheets/origin.ts';
 import { textOf } from '../../src/words/text.ts';
 

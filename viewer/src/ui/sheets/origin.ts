@@ -1,4 +1,5 @@
-import { isSynthetic, type Part, type Provenance } from '../../bundle/manifest.ts';
+import { isSynthetic } from '../../bundle/manifest.ts';
+import type { Part, Provenance } from '../../bundle/texts.ts';
 import type { PageWords } from '../../words/page-words.ts';
 import { say, type Key, type Sentence } from '../../words/text.ts';
 import { byId } from '../elements.ts';
