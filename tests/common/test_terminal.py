@@ -85,3 +85,11 @@ def test_words_that_no_verb_takes_are_shown_so():
             with contextlib.suppress(SystemExit):
                 cli.main(words)
     assert "pwned" in got.getvalue() and "\x1b]" not in got.getvalue()
+
+
+def test_lone_surrogates_which_are_written_as_bytes_are_shown_so():
+    name = "CC0\udcc2\udc9b8m"  # its bytes would be those of U+009B
+    with terminal() as got:
+        print(name)
+        Console(file=sys.stdout, width=80).print(name, markup=False)
+    assert got.getvalue() == "CC0\\udcc2\\udc9b8m\n" * 2

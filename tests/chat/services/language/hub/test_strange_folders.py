@@ -92,6 +92,19 @@ def test_a_model_says_how_it_is_sampled_and_nothing_that_costs_memory(copy):
     assert chosen.eos_token_id is not None
 
 
+def test_rules_of_a_tokenizer_make_no_text_much_longer(copy):
+    usual = [{"type": "Prepend", "prepend": "▁"}, {"type": "Replace", "content": "▁"}]
+    doubling = {"type": "Replace", "pattern": {"String": "zq"}, "content": "zqzq"}
+    for rules in ([doubling] * 40, [doubling | {"content": "zq" * 9}]):
+        told(copy, "tokenizer.json", normalizer={"type": "Sequence", "normalizers": rules})
+        with pytest.raises(ModelError, match="could make a text longer without an end"):
+            load(copy)
+    told(copy, "tokenizer.json", normalizer={"type": "Sequence", "normalizers": usual})
+    from ico3d.chat.services.language.hub import loading
+
+    loading._check_tokenizer(copy / "tokenizer.json")
+
+
 def test_a_name_on_the_hub_is_no_folder_where_a_server_is_started(copy, tmp_path, monkeypatch):
     import huggingface_hub.constants
 

@@ -18,7 +18,7 @@ from ico3d.common.unpacking.heads import check_head
 from ico3d.errors import Ico3dError, ModelError
 
 CONFIG, TOKENIZER = "config.json", "tokenizer.json"
-LARGEST_CONFIG, LARGEST_TOKENIZER = 1 << 20, 64 << 20
+LARGEST_CONFIG, LARGEST_TOKENIZER = 1 << 20, 40 << 20
 """Bytes of a model's settings, and of its vocabulary: large ones have 35 MB."""
 MOST_REPEATED = 1024
 """Layers, heads or experts of a model: for each layer some objects are made before any weight is
@@ -27,6 +27,9 @@ REPEATED = ("layer", "head", "expert")
 TIED, PACKED = 2, 16
 """How many numbers a model may have for one that is stored: embeddings may serve twice, and eight
 or sixteen numbers of quantised weights lie in one."""
+GROWING, MOST_GROWING, LONGEST_GROWTH = ("Replace", "Prepend"), 4, 4
+"""Rules of a tokenizer that put something in the place of a letter, how many of them it may have, and
+the letters of that: for a space, `▁` takes one."""
 CHOSEN = (
     *("do_sample", "temperature", "top_k", "top_p", "min_p", "typical_p", "repetition_penalty"),
     *("bos_token_id", "eos_token_id", "pad_token_id"),
@@ -73,8 +76,8 @@ def _check(folder: Path, kept: dict[str, Any]) -> None:
     Raises:
         ModelError: If it does.
     """
-    if (folder / TOKENIZER).is_file() and (folder / TOKENIZER).stat().st_size > LARGEST_TOKENIZER:
-        raise ModelError(f"{folder / TOKENIZER} has more than {LARGEST_TOKENIZER >> 20} MiB.")
+    if (folder / TOKENIZER).is_file():
+        _check_tokenizer(folder / TOKENIZER)
     settings = json.loads(read_small(folder / CONFIG, most=LARGEST_CONFIG))
     for name, value in _numbers(settings):
         if value > MOST_REPEATED and any(word in name for word in REPEATED):
@@ -86,6 +89,29 @@ def _check(folder: Path, kept: dict[str, Any]) -> None:
     each = PACKED if "quantization_config" in settings else TIED
     if sum(one.numel() for one in claimed.parameters()) > each * _stored(folder):
         raise ModelError(f"{folder}: {CONFIG} claims a larger model than its weights are.")
+
+
+def _check_tokenizer(path: Path) -> None:
+    """Refuses a vocabulary whose rules can make a text much longer: each may double it.
+
+    Raises:
+        ModelError: If it has more of them than any usual one, or longer ones.
+    """
+    words = json.loads(read_small(path, most=LARGEST_TOKENIZER))
+    parts = [words.get(name) for name in ("normalizer", "pre_tokenizer", "decoder")]
+    longer = [one for part in parts for one in _parts(part) if one.get("type") in GROWING]
+    told = [str(one.get("content", one.get("prepend", ""))) for one in longer]
+    if len(longer) > MOST_GROWING or any(len(text) > LONGEST_GROWTH for text in told):
+        raise ModelError(f"{path} has rules that could make a text longer without an end.")
+
+
+def _parts(part: Any) -> Iterator[dict[str, Any]]:
+    """A part of a tokenizer, and all that it consists of."""
+    if isinstance(part, dict):
+        yield part
+    for value in part.values() if isinstance(part, dict) else part or ():
+        if isinstance(value, dict | list):
+            yield from _parts(value)
 
 
 def _numbers(settings: Any, name: str = "") -> Iterator[tuple[str, float]]:
