@@ -9,8 +9,8 @@ from rich import control
 from ico3d.errors import printable
 
 TURNING = "\u200e\u200f\u2028\u2029\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
-OBEYED = {*map(chr, [*range(32), *range(127, 160), *range(0xD800, 0xE000)]), *TURNING}
-OBEYED -= {"\n", "\t"}
+_CODES = (*range(9), *range(11, 32), *range(127, 160), *range(0xD800, 0xE000))
+OBEYED = {*map(chr, _CODES), *TURNING}
 """Control characters but for line ends and tabs, those that turn the direction of reading, and lone
 surrogates, which may be written as the bytes of others."""
 SHOWN = {ord(character): printable(character) for character in OBEYED}

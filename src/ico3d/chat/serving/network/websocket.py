@@ -71,7 +71,8 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
 
     async def run_asgi(self) -> None:
         """Serves the connection, which is ended a while after it was closed or refused."""
-        self.scope[GONE] = self._gone
+        scope: Any = self.scope  # of whose keys some are uvicorn's
+        scope[GONE] = self._gone
         await super().run_asgi()
         if not self._gone.done():  # else nothing would let go of it meanwhile
             self._farewell = self.loop.call_later(FAREWELL, self._end_if_read)

@@ -28,8 +28,8 @@ TIED, PACKED = 2, 16
 """How many numbers a model may have for one that is stored: embeddings may serve twice, and eight
 or sixteen numbers of quantised weights lie in one."""
 GROWING, MOST_GROWING, LONGEST_GROWTH = ("Replace", "Prepend"), 4, 4
-"""Rules of a tokenizer that put something in the place of a letter, how many of them it may have, and
-the letters of that: for a space, `▁` takes one."""
+"""Rules of a tokenizer that put something in the place of a letter, how many of them it may have,
+and the letters of that: for a space, `▁` takes one."""
 CHOSEN = (
     *("do_sample", "temperature", "top_k", "top_p", "min_p", "typical_p", "repetition_penalty"),
     *("bos_token_id", "eos_token_id", "pad_token_id"),
