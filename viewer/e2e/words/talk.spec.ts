@@ -257,7 +257,7 @@ test('the visitor chooses language and captions, which are remembered; all of it
   expect(await page.getAttribute('#text', 'placeholder')).toBe('Fragen Sie etwas');
   expect(await page.getAttribute('.views button', 'title')).toBe('Gesicht (1)');
   expect(await page.textContent('#stand-ins')).toBe(
-    'Einfache Offline-Dienste hören zu, antworten und sprechen; bessere stehen in den Einstellungen',
+    'Kleine Offline-Dienste hören zu, antworten und sprechen; bessere in den Einstellungen',
   );
   expect(await page.locator('#record .divider').last().textContent()).toMatch(/^Ein neues Gespräch/);
   expect(await page.getAttribute('#captions', 'lang')).toBe(''); // nobody told which one she speaks

@@ -69,7 +69,7 @@ describe('a sentence', () => {
   test('lists what there are several of', () => {
     const names = [say('stand-ins.recognition'), say('stand-ins.language'), say('stand-ins.voice')];
     expect(textOf(say('stand-ins', { names }), 'en')).toBe('Basic offline services listen, answer, and speak; better ones are in the settings');
-    expect(textOf(say('stand-ins-only', { names: names.slice(1) }), 'de')).toBe('Einfache Offline-Dienste antworten und sprechen');
+    expect(textOf(say('stand-ins-only', { names: names.slice(1) }), 'de')).toBe('Kleine Offline-Dienste antworten und sprechen');
     for (const language of languages) expect(textOf(say('stand-ins', { names }), language).length).toBeLessThan(105); // two lines of a phone
   });
 
