@@ -78,6 +78,11 @@ function areTexts(values: unknown, most: number, longest: number, form = /(?:)/)
   return Array.isArray(values) && values.length <= most && values.every((value) => isText(value, longest) && form.test(value as string));
 }
 
+/** What a stranger's JSON says, its texts made calm. */
+export function parseCalmly(text: string): unknown {
+  return JSON.parse(text, (_, value: unknown) => (typeof value === 'string' ? calm(value) : value));
+}
+
 /** A text in which no letter has more marks than writing knows: laying them out takes the square of their number. */
 export function calm(text: string): string {
   return text.replace(MARKS, '$1');

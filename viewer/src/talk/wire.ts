@@ -1,4 +1,4 @@
-import { calm } from '../bundle/texts.ts';
+import { parseCalmly } from '../bundle/texts.ts';
 import { floatsFromHalves } from '../numbers.ts';
 import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, TENSORS, VERSION, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
 import { SERVER_FIELDS } from './line/fields.ts';
@@ -65,7 +65,7 @@ export function decode(frame: string | ArrayBuffer): ServerMessage {
 
 function parse(text: string): Header {
   if (text.length > MAX_TEXT_FRAME) throw new Error(`a text of more than ${MAX_TEXT_FRAME} bytes`);
-  return JSON.parse(text, (_, value: unknown) => (typeof value === 'string' ? calm(value) : value)) as Header;
+  return parseCalmly(text) as Header;
 }
 
 /** Whether sizes are some of an array; a frame's bytes bound each, also where another one is 0 and nothing was sent. */

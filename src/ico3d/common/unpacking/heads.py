@@ -12,8 +12,8 @@ SMALL_HEAD = 1 << 20
 """Bytes of a head that is parsed here: what it says becomes thirty times as much."""
 
 
-def check_head(path: Path, most: int = MOST_HEAD) -> None:
-    """Refuses a file whose head takes much memory, before it is opened.
+def check_head(path: Path, most: int = MOST_HEAD) -> bytes:
+    """Refuses a file whose head takes much memory, before it is opened; the head, which is JSON.
 
     Args:
         path: The file.
@@ -25,7 +25,9 @@ def check_head(path: Path, most: int = MOST_HEAD) -> None:
     """
     with path.open("rb") as file:
         size = int.from_bytes(file.read(8), "little")
-        _check(size, file.read(min(size, most)), most)
+        head = file.read(min(size, most))
+    _check(size, head, most)
+    return head
 
 
 def bounded_head(content: bytes, most: int = SMALL_HEAD) -> bytes:

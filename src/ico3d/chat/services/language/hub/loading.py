@@ -130,11 +130,9 @@ def _stored(folder: Path) -> int:
     """How many numbers a folder's weights hold."""
     count = 0
     for path in folder.glob("*.safetensors"):
-        check_head(path)
-        with path.open("rb") as file:
-            size = int.from_bytes(file.read(8), "little")
-            head = json.loads(file.read(size))
-        head.pop("__metadata__", None)
-        bytes_held = path.stat().st_size - 8 - size
-        count += min(sum(math.prod(one["shape"]) for one in head.values()), bytes_held)
+        head = check_head(path)
+        told = json.loads(head)
+        told.pop("__metadata__", None)
+        bytes_held = path.stat().st_size - 8 - len(head)
+        count += min(sum(math.prod(one["shape"]) for one in told.values()), bytes_held)
     return count
