@@ -7,7 +7,14 @@ from collections import Counter
 import pytest
 
 from ico3d.chat.serving import crowd as crowds
-from ico3d.chat.serving.crowd import MOST_SOCKETS, UNKNOWN, Crowd, Meters, machine_of
+from ico3d.chat.serving.crowd import (
+    MOST_REQUESTS,
+    MOST_SOCKETS,
+    UNKNOWN,
+    Crowd,
+    Meters,
+    machine_of,
+)
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.waiting import MOST_WAITING, FullError, WaitingLine
 
@@ -78,6 +85,42 @@ async def test_silent_sockets_of_one_machine_leave_room_for_others():
     await asyncio.gather(*(task for task, _ in [*many, refused, neighbour]))
     _, again = await come("10.0.0.7")
     assert again == ["websocket.accept"]
+
+
+async def test_requests_of_one_machine_that_are_worked_on_are_counted():
+    held = asyncio.Event()
+
+    async def app(scope, receive, send):
+        await held.wait()
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+
+    guard = Guard(app, "0.0.0.0")
+
+    async def ask(address):
+        sent = []
+
+        async def send(message):
+            sent.append(message.get("status"))
+
+        async def receive():
+            return {"type": "http.disconnect"}
+
+        headers = [(b"host", b"10.0.0.1:8765")]
+        scope = {"type": "http", "path": "/", "query_string": b"", "headers": headers}
+        task = asyncio.create_task(guard(scope | {"client": (address, 1)}, receive, send))
+        await asyncio.sleep(0)
+        return task, sent
+
+    many = [await ask("10.0.0.7") for _ in range(MOST_REQUESTS)]
+    refused, neighbour = await ask("10.0.0.7"), await ask("10.0.0.8")
+    await refused[0]
+    assert refused[1][0] == 429
+    held.set()
+    await asyncio.gather(*(task for task, _ in [*many, neighbour]))
+    assert all(sent == [200] for _, sent in [*many, neighbour])
+    again, sent = await ask("10.0.0.7")
+    await again
+    assert sent == [200]
 
 
 async def test_dropped_pages_of_one_machine_leave_half_of_the_queue():

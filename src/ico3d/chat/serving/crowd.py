@@ -10,6 +10,8 @@ from ico3d.chat.supervision.allowance import Bucket
 
 MOST_SOCKETS = 64
 """Open WebSockets of one machine; a classroom or an office may share its address."""
+MOST_REQUESTS = 128
+"""Requests of one machine that are worked on, whether their clients are still there or not."""
 GONE = "ico3d.gone"
 """Name of the future in a WebSocket's scope that is done once its connection is lost: what the
 server has closed waits for its client's answer, and takes as much memory meanwhile."""
@@ -20,7 +22,7 @@ OWN_NETWORK = 64  # bits of an IPv6 address that tell one household from another
 
 
 class Crowd:
-    """Counts the open WebSockets of each machine."""
+    """Counts what each machine has open: WebSockets, or requests."""
 
     def __init__(self, most: int = MOST_SOCKETS):
         """Starts without any; `most` is the largest number of one machine."""
@@ -29,7 +31,7 @@ class Crowd:
 
     @contextlib.contextmanager
     def one_more(self, machine: str) -> Generator[bool, None, None]:
-        """Counts a socket until it is closed; yields whether it may be opened.
+        """Counts one until it is closed; yields whether it may be opened.
 
         Args:
             machine: What `machine_of` returned.

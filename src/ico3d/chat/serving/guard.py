@@ -14,7 +14,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ico3d.chat.serving.crowd import GONE, Crowd, machine_of
+from ico3d.chat.serving.crowd import GONE, MOST_REQUESTS, Crowd, machine_of
 from ico3d.chat.serving.refusals import Refusals
 from ico3d.chat.serving.sites import Sites
 
@@ -43,14 +43,14 @@ HEADERS = {
 WITH_CAMERA = "microphone=(self), camera=(self), geolocation=()"
 FOREIGN = "This server answers only its own pages: open it under the address it printed.\n"
 NO_TOKEN = "The page's token is missing or has expired.\n"
-TOO_MANY = "This machine has too many connections open.\n"
+TOO_MANY = "This machine has too many connections open, or requests that are not answered yet.\n"
 
 
 class Guard:
     """ASGI middleware: 403 for a foreign Origin or Host, security headers on every response.
 
     Sites that may embed the avatar load what they need; a missing token is answered with 401. One
-    machine may have so many WebSockets open and no more.
+    machine may have so many WebSockets open, and requests worked on, and no more.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Guard:
         self._host = host
         self._sites = sites or Sites()
         self._names = frozenset(names)
-        self._crowd = Crowd()
+        self._crowd, self._requests = Crowd(), Crowd(MOST_REQUESTS)
         self._refusals = refusals
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -112,7 +112,11 @@ class Guard:
             await self._refuse(401, NO_TOKEN, scope, receive, with_headers)
             return
         if scope["type"] == "http":
-            await self._app(scope, receive, with_headers)
+            with self._requests.one_more(machine_of(scope.get("client"))) as may:
+                if may:
+                    await self._app(scope, receive, with_headers)
+                else:
+                    await self._refuse(429, TOO_MANY, scope, receive, with_headers)
             return
         with contextlib.ExitStack() as place:
             may = place.enter_context(self._crowd.one_more(machine_of(scope.get("client"))))

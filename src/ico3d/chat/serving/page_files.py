@@ -6,6 +6,7 @@ Vite writes each text file also as `NAME.br` and `NAME.gz` (`viewer/compression.
 compressed files is served uncompressed.
 """
 
+import asyncio
 import hashlib
 import os
 import re
@@ -16,9 +17,10 @@ from pathlib import Path
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
-from starlette.responses import FileResponse, Response
+from starlette.requests import Request
+from starlette.responses import Response
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
-from starlette.types import Scope
+from starlette.types import Receive, Scope, Send
 
 ENCODINGS = {"br": ".br", "gzip": ".gz"}
 """Content codings and the suffixes of compressed files, the smallest first."""
@@ -30,6 +32,8 @@ TYPES = {".css": "text/css", ".html": "text/html", ".js": "text/javascript"}
 """Content types that the machine's own table must not change: browsers check those of scripts."""
 LONGEST, DEEPEST = 512, 8
 """Letters and folders of a path that is looked for: the system looks at every folder of it."""
+AT_ONCE = 2
+"""Files that are looked for at a time, each in a thread: dozens of them would keep the loop out."""
 WEIGHT = re.compile(r"0(\.\d{0,3})?|1(\.0{0,3})?")
 
 
@@ -40,6 +44,15 @@ class PageFiles(StaticFiles):
         """Serves the files of `folder`; / gives `index.html`, /NAME also `NAME.html`."""
         super().__init__(directory=folder, html=True)
         self._hashed = folder.resolve() / HASHED
+        self._turns = asyncio.Semaphore(AT_ONCE)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answers in turn; nothing is looked for on behalf of those who have left meanwhile."""
+        async with self._turns:
+            if await Request(scope, receive).is_disconnected():
+                return
+            response = await self.get_response(self.get_path(scope), scope)
+        await response(scope, receive, send)
 
     def get_path(self, scope: Scope) -> str:
         """The path of a request within the folder; none that no page's file has is looked at."""
@@ -72,9 +85,9 @@ class PageFiles(StaticFiles):
         file = forms.get(chosen, plain)
         stat = file.stat() if chosen else stat_result
         media_type = TYPES.get(plain.suffix) or guess_type(plain)[0]
-        response = FileResponse(file, status_code, media_type=media_type, stat_result=stat)
-        # of the content: all files of a wheel are of the same second, and often of the same size
-        response.headers["ETag"] = _tag(file, stat.st_mtime_ns, stat.st_size)
+        content, tag = _content(file, stat.st_mtime_ns, stat.st_size)
+        response = Response(content, status_code, media_type=media_type)
+        response.headers["ETag"] = tag
         response.headers["Cache-Control"] = FOR_EVER if self._hashed in plain.parents else ASK_AGAIN
         if forms:
             response.headers["Vary"] = "Accept-Encoding"
@@ -110,6 +123,10 @@ def _coding(part: str) -> tuple[str, float]:
 
 
 @lru_cache(maxsize=256)
-def _tag(file: Path, changed: int, size: int) -> str:
-    """The ETag of a file as it was `changed` (ns), of `size` bytes: a hash of what is in it."""
-    return f'"{hashlib.sha256(file.read_bytes()).hexdigest()[:32]}"'
+def _content(file: Path, changed: int, size: int) -> tuple[bytes, str]:
+    """A file as it was `changed` (ns), of `size` bytes, and its ETag.
+
+    The ETag is of the content: all files of a wheel are of the same second, and often as long.
+    """
+    content = file.read_bytes()
+    return content, f'"{hashlib.sha256(content).hexdigest()[:32]}"'

@@ -37,6 +37,16 @@ async def test_handshakes_count_as_connections_of_their_machine(secured, monkeyp
     await until(lambda: prompt._open["10.0.0.7"] == 0)
 
 
+async def test_a_connection_with_tls_arrives_once(secured, monkeypatch):
+    port, trust = secured
+    monkeypatch.setattr(prompt, "_arrivals", crowd.Meters(0.0, 2.0, lambda: 0.0))
+    monkeypatch.setattr(crowd, "machine_of", lambda client: client and "10.0.0.7")
+    assert [await health(port, trust) for _ in range(2)] == [200, 200]
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    assert await is_closed(reader, 5)
+    writer.close()
+
+
 @pytest.mark.parametrize("sent", [b"", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc"])
 async def test_a_handshake_that_does_not_end_is_given_up(secured, monkeypatch, sent):
     monkeypatch.setattr(prompt, "HEAD", 1.0)

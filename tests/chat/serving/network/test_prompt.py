@@ -15,6 +15,7 @@ import ico3d
 from ico3d.chat.serving import crowd
 from ico3d.chat.serving.network import prompt
 from support.chat.serving import running, serving
+from support.chat.waiting import until
 
 SOURCES = Path(ico3d.__file__).parent
 REQUEST = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n"
@@ -323,6 +324,20 @@ async def test_one_machine_opens_so_many_connections_and_no_more(port, monkeypat
         assert (await reader.readline()).startswith(b"HTTP/1.1 200")
     await asyncio.sleep(1)
     assert prompt._open["10.0.0.7"] == 0
+
+
+async def test_who_connects_and_leaves_without_a_pause_is_turned_away(port, monkeypatch):
+    arrivals = crowd.Meters(0.0, 5.0, lambda: 0.0)
+    monkeypatch.setattr(prompt, "_arrivals", arrivals)
+    monkeypatch.setattr(crowd, "machine_of", lambda client: client and "10.0.0.7")
+    for _ in range(5):
+        async with connected(port) as (reader, writer):
+            writer.write(REQUEST % port + b"\r\n")
+            assert (await reader.readline()).startswith(b"HTTP/1.1 200")
+    async with connected(port) as (reader, _):
+        assert await seconds_until_closed(reader) < 1
+    assert arrivals.take("10.0.0.8")
+    await until(lambda: prompt._open["10.0.0.7"] == 0)
 
 
 def test_the_system_is_asked_for_connections(monkeypatch):

@@ -41,7 +41,8 @@ class Handshake(asyncio.Protocol):
         client = transport.get_extra_info("peername")
         self._machine = peer_of(client, self._served["config"].loaded_app)
         self._counted = True
-        if not prompt.count_in(self._machine):
+        may = prompt.may_arrive(self._machine)
+        if not (prompt.count_in(self._machine) and may):
             transport.abort()
             return
         loop = asyncio.get_running_loop()

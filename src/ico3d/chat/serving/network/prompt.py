@@ -7,12 +7,13 @@ close a server to everybody.
 
 import asyncio
 import resource
+import time
 from collections import Counter
 from typing import NoReturn
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
-from ico3d.chat.serving.crowd import peer_of
+from ico3d.chat.serving.crowd import Meters, peer_of
 from ico3d.errors import ProtocolError
 
 HEAD = 10.0  # s for the head of a request
@@ -22,6 +23,9 @@ PIECES, SMALL = 200, 512
 """Pieces of a request's body after which they must have so many bytes on average: each costs this
 process time, however small it is, and a chunk of one byte is a piece."""
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
+RATE, AT_ONCE = 32.0, 256.0
+"""New connections of one machine in a second, and at once: a browser opens six for a page, and
+keeps them. Who leaves at once frees a place, while the request that was sent is worked on."""
 DESCRIPTORS = 1 << 16  # that a server asks the system for
 LONGEST_TARGET = 4096  # bytes of what a request asks for, its query included
 UNREAD = (b"cookie", b"sec-websocket-protocol", b"sec-websocket-extensions")
@@ -38,6 +42,7 @@ MOST_PARSED = 2048
 """Bytes of all of these in a request. Heads of many connections come in one turn of the loop, which
 has time for each of them only if none costs more than a millisecond."""
 _open: Counter[str] = Counter()
+_arrivals = Meters(RATE, AT_ONCE, time.monotonic)
 
 
 class PromptProtocol(HttpToolsProtocol):
@@ -51,14 +56,18 @@ class PromptProtocol(HttpToolsProtocol):
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Opens the connection, or closes it if its machine has too many."""
+        """Opens the connection, or closes it if its machine has too many, or too many new ones.
+
+        One with TLS has arrived before its handshake.
+        """
         super().connection_made(transport)
         self._machine = peer_of(self.client, self.app)
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
         self._first: RequestResponseCycle | None = None  # that another one may wait for
-        if count_in(self._machine):
+        may = transport.get_extra_info("sslcontext") or may_arrive(self._machine)
+        if count_in(self._machine) and may:
             self._await_head()
         else:
             transport.abort()
@@ -190,6 +199,11 @@ class PromptProtocol(HttpToolsProtocol):
         if self._counted:
             self._counted = False
             count_out(self._machine)
+
+
+def may_arrive(machine: str) -> bool:
+    """Counts a new connection of a machine; returns whether it has not had too many lately."""
+    return _arrivals.take(machine)
 
 
 def count_in(machine: str) -> bool:
