@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ico3d.studio.person.growing import face, styles, tied, wisps
+from ico3d.studio.person.growing import face, fringe, styles, tied, wisps
 from ico3d.studio.person.growing.skull import Skull, skull_of
 from ico3d.studio.person.scatter import areas, scattered
 from ico3d.studio.person.strands import Strands, bound, joined
@@ -22,6 +22,8 @@ BABY_HAIRS, FLYAWAYS = 2600, 160
 """Short hairs at the hairline of tied hair, and strands that leave its surface."""
 RADIUS = 0.00013
 """Half of a strand's thickness in metres: thicker than real hair, which is more numerous."""
+FRINGE = 2600
+"""Strands of a fringe."""
 EDGE = 0.015
 """Metres over which the hairline thins out: the strands there are fewer and finer."""
 AWAY = 0.03
@@ -104,6 +106,9 @@ def _escaped(
     high = np.flatnonzero((combed.depth[:, -4] < 0.3) & (roots[:, 1] > 0.03 * skull.scale))
     kept = random.choice(high, FLYAWAYS)
     groups.append((corners[kept], parts[kept], wisps.flyaways(skull, combed.points[kept], random)))
+    kept = np.flatnonzero(fringe.belongs(skull, places))
+    kept = random.choice(kept, min(FRINGE, len(kept)), replace=False)
+    groups.append((skin[kept], at[kept], fringe.curtain(skull, places[kept], random)))
     return [_of(subject, c, p, w, np.full(len(c), 1.0), random) for c, p, w in groups]
 
 

@@ -44,9 +44,9 @@ def tied(skull: Skull, roots: np.ndarray, tie: np.ndarray, random: np.random.Gen
     # Beside and behind, locks cross the shortest way a little up or down.
     path[..., 1] += (0.045 * (1 - front) * combed)[:, None] * np.sin(np.pi * t)
     path = unit(path)
-    level = random.random(count) ** 0.45  # 1: on the surface
+    level = random.random(count) ** 0.25  # 1: on the surface
     top = smooth(0.2, 0.9, path[..., 1]) * np.exp(-((path[..., 0] / 0.5) ** 2))  # (N, K)
-    full = 0.0042 + 0.0085 * top * np.sin(np.pi * t) ** 0.5
+    full = 0.0042 + 0.0065 * top * np.sin(np.pi * t) ** 0.5
     full = full + 0.004 * smooth(0.2, 0.8, t)[None]
     full = full * (1 + 0.05 * random.standard_normal(LOCKS)[lock] - 0.06 * edge)[:, None]
     rise = 1 - np.exp(-4 * t)

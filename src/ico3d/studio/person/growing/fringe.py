@@ -1,0 +1,63 @@
+"""A fringe that is parted above the forehead and frames the face, as a curtain does a window."""
+
+import numpy as np
+
+from ico3d.studio.person.growing.skull import Skull
+from ico3d.studio.person.growing.styles import Paths, clumped, smooth, unit, waves
+from ico3d.studio.person.growing.tied import locks
+
+POINTS = 20
+LOCKS = 46
+"""Locks of a fringe: strands of one hang together, and differ in tone and length from others."""
+PARTING = np.radians(7.0)
+"""Where it is parted, from the middle of the face to the left."""
+WIDEST = np.radians(74.0)
+"""How far from the middle it begins."""
+DEEPEST = 0.026
+"""Metres behind the hairline from which it comes."""
+
+
+def belongs(skull: Skull, places: np.ndarray) -> np.ndarray:
+    """(N,) whether hair at places (N, 3) on the scalp, metres, is part of a fringe."""
+    start = unit(places - skull.centre)
+    angle = np.abs(np.arctan2(start[:, 0], start[:, 2]))
+    inside = skull.inside_hairline(places)
+    deep = skull.scale * DEEPEST * (1 - 0.6 * (angle / WIDEST) ** 2)
+    return (angle < WIDEST) & (inside > -0.002) & (inside < deep)
+
+
+def curtain(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Paths:
+    """Hair from roots (N, 3) that rises, falls aside over the temples and ends beside the cheeks."""
+    count = len(roots)
+    start = unit(roots - skull.centre)
+    turn, rise = np.arctan2(start[:, 0], start[:, 2]), np.arcsin(start[:, 1])
+    lock, edge = locks(roots, LOCKS)
+    of_lock = random.standard_normal((LOCKS, 4))[lock]
+    parted = turn - PARTING + 0.03 * random.standard_normal(count)
+    side = np.where(parted < 0, -1.0, 1.0)
+    out = np.clip(np.abs(parted) / WIDEST, 0, 1)  # 0 at the parting
+    level = random.random(count) ** 0.6  # 1: on the surface
+    t = np.linspace(0, 1, POINTS)
+    aim = 61 + 13 * out + 6.0 * of_lock[:, 0] + 3.0 * random.standard_normal(count)
+    aim = side * np.radians(aim)
+    low = 30 + 20 * out + 11.0 * of_lock[:, 1] + 5.0 * random.standard_normal(count)
+    low = -np.radians(np.clip(low, -5, 62))
+    across = smooth(0.0, 0.82, t) ** 0.85
+    down = t ** (1.25 + 0.2 * random.standard_normal(LOCKS)[lock])[:, None]
+    angle = turn[:, None] + (aim - turn)[:, None] * across
+    height = rise[:, None] + (low - rise)[:, None] * down
+    ring = np.cos(height)
+    path = np.stack([ring * np.sin(angle), np.sin(height), ring * np.cos(angle)], -1)
+    full = 0.004 + 0.011 * np.sin(np.pi * np.minimum(1, 1.15 * t) ** 0.8) ** 1.2
+    flick = (0.007 + 0.005 * of_lock[:, 2])[:, None] * t**4
+    lift = skull.scale * (full * (0.35 + 0.65 * level[:, None]) * (1 - np.exp(-9 * t)) + flick)
+    above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)
+    points = skull.on(path, above[:, None] * np.exp(-6 * t) + 0.0008 + lift)
+    for one in (side > 0, side < 0):
+        points[one] = clumped(points[one], 0.15, 90, 0.62)
+    points += 0.0030 * waves(LOCKS, POINTS, 0.6, random)[lock]
+    points += 0.0012 * waves(count, POINTS, 0.7, random)
+    depth = np.clip(1 - level + 0.2 * edge, 0, 1)[:, None] * np.minimum(1, 4 * t)
+    taper = np.broadcast_to(0.9 - 0.7 * t**2, depth.shape)
+    tone = np.exp(0.13 * of_lock[:, 3] + random.normal(0, 0.08, count) + 0.12 * (level - 0.5) + 0.25)
+    return Paths(points, depth, taper, tone)
