@@ -13,6 +13,8 @@ PARTING = np.radians(7.0)
 """Where it is parted, from the middle of the face to the left."""
 WIDEST = np.radians(74.0)
 """How far from the middle it begins."""
+THIN = 0.25
+"""Logarithm of how much brighter a fringe is than other hair: light goes through it."""
 DEEPEST = 0.026
 """Metres behind the hairline from which it comes."""
 
@@ -27,37 +29,63 @@ def belongs(skull: Skull, places: np.ndarray) -> np.ndarray:
 
 
 def curtain(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Paths:
-    """Hair from roots (N, 3) that rises, falls aside over the temples and ends beside the cheeks."""
+    """Hair that rises from its roots, falls over the temples and ends beside the cheeks.
+
+    Args:
+        skull: The head.
+        roots: (N, 3) places of the roots, metres.
+        random: Source of all random choices.
+    """
     count = len(roots)
     start = unit(roots - skull.centre)
-    turn, rise = np.arctan2(start[:, 0], start[:, 2]), np.arcsin(start[:, 1])
+    turn = np.arctan2(start[:, 0], start[:, 2])
     lock, edge = locks(roots, LOCKS)
     of_lock = random.standard_normal((LOCKS, 4))[lock]
     parted = turn - PARTING + 0.03 * random.standard_normal(count)
-    side = np.where(parted < 0, -1.0, 1.0)
-    out = np.clip(np.abs(parted) / WIDEST, 0, 1)  # 0 at the parting
     level = random.random(count) ** 0.6  # 1: on the surface
+    ways = _falling(start, parted, of_lock, lock, random)
     t = np.linspace(0, 1, POINTS)
-    aim = 61 + 13 * out + 6.0 * of_lock[:, 0] + 3.0 * random.standard_normal(count)
-    aim = side * np.radians(aim)
-    low = 30 + 20 * out + 11.0 * of_lock[:, 1] + 5.0 * random.standard_normal(count)
-    low = -np.radians(np.clip(low, -5, 62))
-    across = smooth(0.0, 0.82, t) ** 0.85
-    down = t ** (1.25 + 0.2 * random.standard_normal(LOCKS)[lock])[:, None]
-    angle = turn[:, None] + (aim - turn)[:, None] * across
-    height = rise[:, None] + (low - rise)[:, None] * down
-    ring = np.cos(height)
-    path = np.stack([ring * np.sin(angle), np.sin(height), ring * np.cos(angle)], -1)
     full = 0.004 + 0.011 * np.sin(np.pi * np.minimum(1, 1.15 * t) ** 0.8) ** 1.2
     flick = (0.007 + 0.005 * of_lock[:, 2])[:, None] * t**4
     lift = skull.scale * (full * (0.35 + 0.65 * level[:, None]) * (1 - np.exp(-9 * t)) + flick)
-    above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)
-    points = skull.on(path, above[:, None] * np.exp(-6 * t) + 0.0008 + lift)
-    for one in (side > 0, side < 0):
+    above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)  # (N,)
+    points = skull.on(ways, above[:, None] * np.exp(-6 * t) + 0.0008 + lift)
+    for one in (parted >= 0, parted < 0):
         points[one] = clumped(points[one], 0.15, 90, 0.62)
     points += 0.0030 * waves(LOCKS, POINTS, 0.6, random)[lock]
     points += 0.0012 * waves(count, POINTS, 0.7, random)
     depth = np.clip(1 - level + 0.2 * edge, 0, 1)[:, None] * np.minimum(1, 4 * t)
     taper = np.broadcast_to(0.9 - 0.7 * t**2, depth.shape)
-    tone = np.exp(0.13 * of_lock[:, 3] + random.normal(0, 0.08, count) + 0.12 * (level - 0.5) + 0.25)
-    return Paths(points, depth, taper, tone)
+    shades = 0.13 * of_lock[:, 3] + random.normal(0, 0.08, count) + 0.12 * (level - 0.5)
+    return Paths(points, depth, taper, np.exp(shades + THIN))
+
+
+def _falling(
+    start: np.ndarray,
+    parted: np.ndarray,
+    of_lock: np.ndarray,
+    lock: np.ndarray,
+    random: np.random.Generator,
+) -> np.ndarray:
+    """(N, K, 3) unit directions from the skull's centre, along strands that begin at (N, 3).
+
+    Args:
+        start: (N, 3) unit directions of the roots.
+        parted: (N,) angle from the parting to the left, radians.
+        of_lock: (N, 4) what strands of a lock have in common, of unit deviation.
+        lock: (N,) the lock of each strand.
+        random: Source of all random choices.
+    """
+    count = len(start)
+    turn, rise = np.arctan2(start[:, 0], start[:, 2]), np.arcsin(start[:, 1])
+    out = np.clip(np.abs(parted) / WIDEST, 0, 1)  # 0 at the parting
+    aim = 61 + 13 * out + 6.0 * of_lock[:, 0] + 3.0 * random.standard_normal(count)
+    aim = np.where(parted < 0, -1.0, 1.0) * np.radians(aim)
+    low = 30 + 20 * out + 11.0 * of_lock[:, 1] + 5.0 * random.standard_normal(count)
+    low = -np.radians(np.clip(low, -5, 62))
+    t = np.linspace(0, 1, POINTS)
+    down = t ** (1.25 + 0.2 * random.standard_normal(LOCKS)[lock])[:, None]
+    angle = turn[:, None] + (aim - turn)[:, None] * smooth(0.0, 0.82, t) ** 0.85
+    height = rise[:, None] + (low - rise)[:, None] * down
+    ring = np.cos(height)
+    return np.stack([ring * np.sin(angle), np.sin(height), ring * np.cos(angle)], -1)
