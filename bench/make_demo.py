@@ -27,7 +27,8 @@ from ico3d.avatar.staging import thumbnail
 from ico3d.bundle.animation import ANIMATION, Rest
 from ico3d.bundle.format import THUMBNAIL, Bundle, coarse_first, write_bundle
 from ico3d.bundle.head import HEAD as HEAD_FILE
-from ico3d.bundle.head import HEAD_REST
+from ico3d.bundle.head import HEAD_REST, BakedHead
+from ico3d.bundle.manifest import Manifest
 from ico3d.bundle.packaged import FILE
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import gesture_files
@@ -210,27 +211,47 @@ def slenderer(person: dict[str, np.ndarray], share: float) -> dict[str, np.ndarr
 
 
 def write_finished(path: Path) -> None:
-    """Moves the arms of a bundle's body inwards, with its gestures, and takes red from its skin.
+    """Moves the arms of a bundle's body inwards, with its gestures, and takes red from its skin."""
+    bundle = Bundle.open(path)
+    assert bundle.skinned is not None
+    body = muted(narrower(bundle.skinned))
+    head, gestures = bundle.require_head()[0], gesture_files(body, (), 1.0)
+    write_person(path, bundle, bundle.manifest, head, body, gestures)
+
+
+def write_person(
+    path: Path,
+    bundle: Bundle,
+    manifest: Manifest,
+    head: BakedHead,
+    body: BakedSkinned,
+    more: dict[str, bytes],
+) -> None:
+    """Writes a person's bundle anew, with this head and body, and a thumbnail of her at rest.
 
     She rests where her arms hang: a rule would have her rest where hands are still for longest, at
     her chin.
+
+    Args:
+        path: The file to write.
+        bundle: All that stays as it is.
+        manifest: Its manifest, with what `head` changes there.
+        head: Takes the place of the bundle's.
+        body: Takes the place of the bundle's.
+        more: Further files, by name.
     """
-    bundle = Bundle.open(path)
-    head, poses = bundle.require_head()
-    assert bundle.skinned is not None and bundle.manifest.head is not None
+    assert manifest.head is not None
     assert bundle.animation is not None  # its body moves
-    body = muted(narrower(bundle.skinned))
     old = (HEAD_REST, SKINNED_REST)
     files = {name: bundle.read(name) for name in bundle.manifest.files if name not in old}
-    files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()}
-    files |= gesture_files(body, (), 1.0)
-    person = BakedAvatar(head, SkinnedBody(body), poses)
+    files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()} | more
+    person = BakedAvatar(head, SkinnedBody(body), bundle.require_head()[1])
     files[ANIMATION] = replace(bundle.animation, rest=RESTS).to_bytes()
     seconds = RESTS.end / bundle.animation.fps
-    resting = person.gaussians(seconds, bundle.manifest.head.idle_expression)
-    files[THUMBNAIL] = thumbnail(resting, bundle.manifest.camera, bundle.manifest.background)
-    info = replace(bundle.manifest.head, num_rest=0)
-    manifest = replace(bundle.manifest, head=info, skinned=replace(body.info, num_rest=0))
+    resting = person.gaussians(seconds, manifest.head.idle_expression)
+    files[THUMBNAIL] = thumbnail(resting, manifest.camera, manifest.background)
+    info = replace(manifest.head, num_rest=0)
+    manifest = replace(manifest, head=info, skinned=replace(body.info, num_rest=0))
     write_bundle(path, *coarse_first(manifest, files))
 
 

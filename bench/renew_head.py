@@ -1,0 +1,94 @@
+"""Puts a head that was trained anew in place of a bundle's, on the body that it had.
+
+    python bench/renew_head.py old.ico3d HEAD HEAD_CAPTURE BODY_CAPTURE new.ico3d
+
+For the same person in the same light, as `make_demo.py` records them: the body was trained beside
+the old head, and its Gaussians stay bit for bit what they are. BODY_CAPTURE says where the face is
+in the body's recording; its pictures are not looked at. It prints what baking the head costs.
+"""
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+import tyro
+from make_demo import check, write_person
+
+from ico3d.avatar.baking import head_bundle
+from ico3d.avatar.baking.person_bundle import moved_head
+from ico3d.avatar.baking.samples import expressions_at, references_around, samples_around
+from ico3d.avatar.joining.cropping import cropped
+from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
+from ico3d.bundle.format import SPEECH, Bundle
+from ico3d.capture.capture import Capture
+from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.region import HeadRegion
+from ico3d.capture.formats import open_capture
+from ico3d.cli import run_script
+from ico3d.errors import CaptureError, ModelError
+from ico3d.head.model_folder import TrainedHead
+
+
+@dataclass(frozen=True)
+class Renewal:
+    """What goes where.
+
+    Attributes:
+        old: Bundle of a whole person on a skeleton.
+        head: Folder of the head that was trained anew.
+        head_capture: Its recording.
+        body_capture: A recording of the whole person, with landmarks of the face.
+        out: The bundle to write.
+    """
+
+    old: tyro.conf.Positional[Path]
+    head: tyro.conf.Positional[Path]
+    head_capture: tyro.conf.Positional[Path]
+    body_capture: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+
+    @torch.no_grad()
+    def run(self) -> None:
+        """Bakes the head, puts it on, writes and checks the bundle."""
+        bundle, trained = Bundle.open(self.old), TrainedHead.load(self.head)
+        old, body, adaptor = bundle.manifest.head, bundle.skinned, trained.adaptor
+        if old is None or body is None:
+            raise ModelError(f"{self.old} is no whole person on a skeleton.")
+        if trained.landmarks is None or adaptor is None:
+            raise ModelError(f"{self.head} has no landmarks, or is not driven by speech.")
+        placed = _place(trained.landmarks, open_capture(self.body_capture))
+        trained = cropped(trained, HeadRegion.around(trained.landmarks))
+        result, idle = _baked(trained, open_capture(self.head_capture))
+        head = head_bundle.driven(moved_head(result.head, placed), trained)
+        onnx, speech = head_bundle.speech_file(adaptor, trained.encoder)
+        info = head_bundle.head_info(head, trained, idle, old.fps, old.num_poses)
+        manifest = replace(bundle.manifest, head=info, speech=speech, loss=result.loss)
+        write_person(self.out, bundle, manifest, head, body, {SPEECH: onnx})
+        check(self.out)
+
+
+def _place(landmarks: np.ndarray, body: Capture) -> np.ndarray:
+    """(4, 4) from a head model's space, with these landmarks, to the head space of a recording."""
+    there = canonical_landmarks(body)
+    if there is None:
+        raise CaptureError(f"{body.path} has no landmarks of the face.")
+    matrix, rest = canonical_from_head(there, landmarks)
+    print(fit_in_words(matrix, rest))
+    return matrix
+
+
+def _baked(head: TrainedHead, capture: Capture) -> tuple[head_bundle.BakedResult, np.ndarray]:
+    """The baked head, in the space of its model, and its (B,) expression at rest."""
+    track, split = head.track(capture), capture.split
+    samples = samples_around(head, expressions_at(track, split.train))
+    tests = expressions_at(track, split.test or split.train)
+    views = references_around(head, tests, head_bundle.MEASURED_VIEWS)
+    result = head_bundle.bake(head, views, samples, None, print)
+    head_bundle.check(result)
+    return result, head_bundle.idle_expression(head, samples.expressions)
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(Renewal))
