@@ -1,3 +1,4 @@
+import { brief } from './words/calm.ts';
 import { english, say, type Sentence } from './words/text.ts';
 
 /** An error that says in one sentence what a visitor can read; its message is that sentence in English. */
@@ -6,13 +7,13 @@ export class PageError extends Error {
   readonly sentence: Sentence;
 
   constructor(sentence: Sentence) {
-    super(english(sentence));
-    this.sentence = sentence;
+    super(brief(english(sentence)));
+    this.sentence = typeof sentence === 'string' ? brief(sentence) : sentence;
   }
 }
 
 /** The sentence to show for anything thrown. */
 export function sentenceOf(error: unknown): Sentence {
   if (error instanceof PageError) return error.sentence;
-  return say('error.page', { detail: error instanceof Error ? error.message : String(error) });
+  return say('error.page', { detail: brief(error instanceof Error ? error.message : String(error)) });
 }

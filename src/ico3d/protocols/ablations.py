@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from shutil import copytree
 from typing import Literal
 
+from ico3d.body.planning.flow import copy_cache
 from ico3d.body.settings import BodySettings, Method
 from ico3d.capture.formats import open_capture
 from ico3d.capture.parts.head_of_body import head_in
@@ -241,7 +241,7 @@ def _body_rows(terms: AblationTerms, names: Sequence[str]) -> dict[str, list[dic
     found: dict[str, list[dict]] = {}
     for name in names:
         without, folder = BODIES[name], terms.out / name.replace(" ", "-")
-        copytree(base.folder / "flow", folder / "flow", dirs_exist_ok=True)
+        copy_cache(base.folder / "flow", folder / "flow")
         changed = replace(base, folder=folder, ours=without.change(settings))
         found[name] = [Trial(without.method, seed, changed).run() for seed in terms.seeds]
     return found

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from ico3d.body.planning.flow import clip_flow, dynamic_weights
+from ico3d.body.planning.flow import MOST_CACHED, clip_flow, copy_cache, dynamic_weights
 from ico3d.body.planning.flow_methods import DisFlow, best_method
 from ico3d.body.planning.windows import Window
-from ico3d.errors import CaptureError, MissingExtraError
+from ico3d.errors import CaptureError, MissingExtraError, ModelError
 from support.bodies.moving_ball import BALL, HEIGHT
 from support.weights.raft import NAME, install_torchvision, write_raft
 
@@ -195,3 +195,32 @@ def test_raft_is_taken_where_its_weights_are(monkeypatch, tmp_path, place, reque
     # from -1 to 1 where the picture turns white, times two
     np.testing.assert_array_equal(flow[:, :40], np.full((150, 40, 2), [0.0, -2.0]))
     np.testing.assert_array_equal(flow[:, 40:], np.full((150, 50, 2), [4.0, 2.0]))
+
+
+def test_the_cache_of_a_folder_that_somebody_else_began_is_copied_by_its_names_alone(tmp_path):
+    source, target, secret = tmp_path / "flow", tmp_path / "other", tmp_path / "id_ed25519"
+    source.mkdir()
+    names = [f"{digit:024x}.npz" for digit in range(4)]
+    (source / names[0]).write_bytes(b"measured")
+    secret.write_bytes(b"secret")
+    (source / names[1]).symlink_to(secret)
+    (source / names[2]).symlink_to("/dev/zero")
+    with (source / names[3]).open("wb") as hole:
+        hole.truncate(MOST_CACHED + 1)
+    (source / ".profile").write_text("echo stranger")
+    (source / "more").mkdir()
+    copy_cache(source, target)
+    assert {file.name: file.read_bytes() for file in target.iterdir()} == {names[0]: b"measured"}
+    copy_cache(tmp_path / "none", target)  # nothing was measured yet
+
+
+def test_no_flow_is_written_through_a_link(tmp_path):
+    (tmp_path / "flow").mkdir()
+    (tmp_path / "flow" / f"{7:024x}.npz").write_bytes(b"measured")
+    (tmp_path / "home").mkdir()
+    (tmp_path / "linked").symlink_to(tmp_path / "home")
+    with pytest.raises(ModelError, match="is a link"):
+        copy_cache(tmp_path / "flow", tmp_path / "linked")
+    assert not list((tmp_path / "home").iterdir())
+    copy_cache(tmp_path / "linked", tmp_path / "fresh")
+    assert not (tmp_path / "fresh").exists()

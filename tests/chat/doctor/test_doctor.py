@@ -216,6 +216,25 @@ async def test_a_server_that_says_nothing_is_not_waited_for(monkeypatch):
         )
 
 
+async def test_a_server_that_takes_no_notice_of_an_end_is_left(monkeypatch):
+    left = asyncio.Event()
+
+    async def deaf(wire):
+        wire.transport.pause_reading()
+        await left.wait()
+        wire.transport.abort()
+
+    monkeypatch.setattr(visit, "PATIENCE", 0.2)
+    async with serve(deaf, "127.0.0.1", 0) as server:
+        url = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        begun = time.monotonic()
+        found = await visit.Visitor(url, None, "").findings()
+        took = time.monotonic() - begun
+        left.set()
+    assert took < 5
+    assert "no WebSocket can be opened (nothing came for 0.2 s)" in found[0].what
+
+
 @pytest.mark.parametrize(
     ("scheme", "begins", "said"),
     [

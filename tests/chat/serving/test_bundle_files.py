@@ -15,7 +15,8 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import FileEntry
 from ico3d.bundle.persona import Persona
 from ico3d.chat.serving import bundle_files
-from ico3d.chat.serving.bundle_files import AT_ONCE, PIECE, BundleFiles
+from ico3d.chat.serving.bundle_files import AT_ONCE, BundleFiles
+from ico3d.chat.serving.page_files import PIECE
 from support.chat.serving import TYPED, serving, visiting
 
 FOR_EVER = "public, max-age=31536000, immutable"

@@ -1,5 +1,6 @@
 """How the page's files travel: small where the browser takes it, kept where that is safe."""
 
+import asyncio
 import gzip
 import os
 
@@ -10,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ico3d.chat.serving import server
-from ico3d.chat.serving.page_files import PageFiles
+from ico3d.chat.serving.page_files import PIECE, PageFiles
 
 SCRIPT, SHEET, PICTURE = "assets/index-C0ffee00.js", "assets/index-C0ffee00.css", "assets/x-1.png"
 TEXTS = {
@@ -163,6 +164,24 @@ async def test_nothing_is_looked_for_on_behalf_of_who_has_left(folder, monkeypat
     scope = {"type": "http", "method": "GET", "path": "/", "headers": [], "root_path": ""}
     await files(scope, receive, send)
     assert sent == []
+
+
+async def test_a_file_is_handed_over_in_pieces_that_wait_for_their_reader(tmp_path):
+    whole = bytes(range(256)) * 1000
+    (tmp_path / "script.js").write_bytes(whole)
+    sent = []
+
+    async def receive():
+        await asyncio.Event().wait()
+
+    async def send(message):
+        sent.append(message)
+
+    scope = {"type": "http", "method": "GET", "path": "/script.js", "headers": [], "root_path": ""}
+    await PageFiles(tmp_path)(scope | {"asgi": {"spec_version": "2.4"}}, receive, send)
+    pieces = [message.get("body", b"") for message in sent]
+    assert b"".join(pieces) == whole and max(map(len, pieces)) <= PIECE
+    assert (b"content-length", b"256000") in sent[0]["headers"]
 
 
 async def test_who_asks_for_a_part_gets_the_whole_as_http_allows(page):

@@ -5,7 +5,7 @@ import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, readHeadRows, type BakedHead, type HeadRows } from './baked-head.ts';
 import { checkManifest, type AnyBody, type HeadInfo, type Manifest } from './manifest.ts';
 import { parseSafetensors, takeTensor, type Tensor } from './safetensors.ts';
-import { parseCalmly } from './texts.ts';
+import { parseCalmly } from '../words/calm.ts';
 
 /** A head's files, checked and ready for the GPU. */
 export interface HeadFiles {

@@ -1,3 +1,5 @@
+import { LONGEST } from '../words/calm.ts';
+
 /** Whose the head or the body is, where they come from different people. */
 export interface Part {
   name: 'head' | 'body';
@@ -37,7 +39,7 @@ interface Told {
 
 // UTF-16 units, twice as many as the letters that servers allow: a letter beyond the first plane has two
 const NAME = 400;
-const TEXT = 8000;
+const ORIGIN = { text: 4000, all: 16_000 };
 const MOST = { languages: 100, suggestions: 12, sources: 1000, parts: 16 };
 const LANGUAGE = /^[A-Za-z]{2,8}(-[A-Za-z0-9]{1,8})*$/;
 
@@ -47,10 +49,10 @@ export function badText({ name, persona, provenance }: Told): string | null {
   const lists: Record<string, boolean> = {
     name: isText(name, NAME),
     'persona.name': isText(persona?.name, NAME),
-    'persona.greeting': isText(persona?.greeting, TEXT),
+    'persona.greeting': isText(persona?.greeting, LONGEST),
     'persona.languages': areTexts(persona?.languages ?? [], MOST.languages, NAME, LANGUAGE),
     'persona.suggestions': areTexts(persona?.suggestions ?? [], MOST.suggestions, NAME),
-    'provenance.sources': areTexts(sources, MOST.sources, TEXT),
+    'provenance.sources': areTexts(sources, MOST.sources, ORIGIN.text) && sum(sources) <= ORIGIN.all,
     'provenance.parts': parts === undefined || (Array.isArray(parts) && parts.length <= MOST.parts),
   };
   const wrong = Object.keys(lists).find((key) => !lists[key]);
@@ -66,8 +68,13 @@ export function badText({ name, persona, provenance }: Told): string | null {
 /** The first entry of an object that is no text, of those that it needs and those that it may have. */
 function badIn(where: string, value: object | null, needed: string[], others: string[] = []): string | null {
   const texts = (value ?? {}) as Record<string, unknown>;
-  const wrong = [...needed, ...others].find((key) => !isText(texts[key], TEXT) && !(others.includes(key) && texts[key] === undefined));
+  const wrong = [...needed, ...others].find((key) => !isText(texts[key], ORIGIN.text) && !(others.includes(key) && texts[key] === undefined));
   return wrong ? `${where}.${wrong}` : null;
+}
+
+/** How long texts are together. */
+function sum(texts: readonly string[]): number {
+  return texts.reduce((all, text) => all + text.length, 0);
 }
 
 function isText(value: unknown, most: number): boolean {
@@ -77,15 +84,3 @@ function isText(value: unknown, most: number): boolean {
 function areTexts(values: unknown, most: number, longest: number, form = /(?:)/): boolean {
   return Array.isArray(values) && values.length <= most && values.every((value) => isText(value, longest) && form.test(value as string));
 }
-
-/** What a stranger's JSON says, its texts made calm. */
-export function parseCalmly(text: string): unknown {
-  return JSON.parse(text, (_, value: unknown) => (typeof value === 'string' ? calm(value) : value));
-}
-
-/** A text in which no letter has more marks than writing knows: laying them out takes the square of their number. */
-export function calm(text: string): string {
-  return text.replace(MARKS, '$1');
-}
-
-const MARKS = /([\p{M}\u0e33\u0eb3]{16})[\p{M}\u0e33\u0eb3]+/gu;

@@ -1,4 +1,4 @@
-import { parseCalmly } from '../bundle/texts.ts';
+import { parseCalmly } from '../words/calm.ts';
 import { floatsFromHalves } from '../numbers.ts';
 import { MAX_BINARY_FRAME, MAX_TEXT_FRAME, TENSORS, VERSION, type ClientMessage, type Matrix, type ServerMessage } from '../protocol.ts';
 import { SERVER_FIELDS } from './line/fields.ts';

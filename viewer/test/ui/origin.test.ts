@@ -13,13 +13,13 @@ const FULL = {
   made_on: '2026-11-24',
 };
 const read = (provenance: Provenance) =>
-  rowsOf(provenance).map(([name, value]) => [textOf({ key: name }, 'en'), textOf(value, 'en')]);
+  rowsOf(provenance).map(([name, ...values]) => [textOf({ key: name }, 'en'), values.map((value) => textOf(value, 'en')).join(' | ')]);
 
 test('all that a bundle states is told', () => {
   expect(read(FULL)).toEqual([
     ['Likeness of', 'Jane Doe'],
     ['Consent', 'agreed in writing'],
-    ['Made from', 'me.mp4; hall'],
+    ['Made from', 'me.mp4 | hall'],
     ['Licence', 'ours'],
     ['Made by', 'The museum'],
     ['Made on', '2026-11-24'],
@@ -64,6 +64,6 @@ test('of a cloned voice it is told from which recording it is, and who agreed to
     ['Consent', 'agreed in writing'],
     ['Voice', 'cloned from the recording me.mp4 with OpenVoice; where that is missing, another voice speaks'],
     ['Consent to the voice', 'agreed on 2026-11-26, ticked and spoken'],
-    ['Made from', 'me.mp4; hall'],
+    ['Made from', 'me.mp4 | hall'],
   ]);
 });

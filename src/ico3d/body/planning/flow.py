@@ -1,9 +1,11 @@
 """Measures how much moves from frame to frame, and where, by optical flow in a clip's pictures."""
 
+import contextlib
 import hashlib
 import json
 import logging
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +20,9 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.unpacking.npz import WIDTH, read_npz
-from ico3d.errors import CaptureError
+from ico3d.errors import CaptureError, ModelError
 from ico3d.splat.initial import in_pictures, spacing
 from ico3d.training.log import progress_bar
 
@@ -39,6 +41,9 @@ PERSON = 200.0
 """Assumed height of a picture in centimetres, where cameras do not tell the distance."""
 VERSION = 1
 """Version of cached results, to be counted up when the measurement changes."""
+
+CACHED, MOST_CACHED = re.compile(r"[0-9a-f]{24}\.npz"), 1 << 26
+"""Names of cached files, and bytes of the largest that is copied."""
 
 logger = logging.getLogger(__name__)
 
@@ -137,6 +142,23 @@ def clip_flow(
             "measured."
         )
     return ClipFlow(span, method.name, tuple(flows))
+
+
+def copy_cache(source: Path, target: Path) -> None:
+    """Copies measured flow to where another training of the same clip looks for it.
+
+    Either folder may have been begun by somebody else: nothing but regular files that are named as
+    the cache's and no larger than `MOST_CACHED` is copied, and no link is followed.
+
+    Raises:
+        ModelError: If the target is a link.
+    """
+    if target.is_symlink():
+        raise ModelError(f"{target} is a link: what is measured would be written elsewhere.")
+    for file in sorted(source.glob("*.npz")) if not source.is_symlink() else ():
+        if CACHED.fullmatch(file.name) and not (target / file.name).exists():
+            with contextlib.suppress(OSError):  # no file of ours: it is measured again
+                write_atomic(target / file.name, read_small(file, links=False, most=MOST_CACHED))
 
 
 def dynamic_weights(

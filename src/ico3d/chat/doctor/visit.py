@@ -1,10 +1,11 @@
 """A short visit: whether WebSockets pass, strangers do not, and a dropped page finds back."""
 
 import asyncio
+import contextlib
 import ssl
 import statistics
 import time
-from collections.abc import Iterable
+from collections.abc import AsyncIterator, Iterable
 
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidHandshake, WebSocketException
@@ -67,10 +68,19 @@ class Visitor:
             proxy=None,
         )
 
+    @contextlib.asynccontextmanager
+    async def _open(self, path: str, origin: str) -> AsyncIterator[ClientConnection]:
+        """A WebSocket, which is left without waiting for what else the server has to say."""
+        wire = await self._connect(path, origin)
+        try:
+            yield wire
+        finally:
+            wire.transport.abort()
+
     async def _way(self) -> Finding:
         """How long a message takes there and back."""
         took = []
-        async with self._connect("/echo", self._url) as wire:
+        async with self._open("/echo", self._url) as wire:
             for _ in range(ROUNDS):
                 began = time.monotonic()
                 await wire.send("x")
@@ -84,7 +94,7 @@ class Visitor:
     async def _strangers(self) -> Finding:
         """Whether pages of other sites are kept out."""
         try:
-            async with self._connect("/ws", FOREIGN):
+            async with self._open("/ws", FOREIGN):
                 return bad(
                     "pages of other sites may talk with it",
                     "let the proxy leave the header Origin as it is.",

@@ -6,7 +6,6 @@ address without a hash they ask again, and get 304 while the file is the same.
 
 import asyncio
 import gzip
-from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 from weakref import WeakValueDictionary
@@ -18,7 +17,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.people.voice import VOICE
 from ico3d.bundle.persona import Persona
-from ico3d.chat.serving.page_files import ASK_AGAIN, FOR_EVER, preferred
+from ico3d.chat.serving.page_files import ASK_AGAIN, FOR_EVER, Content, preferred
 from ico3d.errors import BundleError
 
 TYPES = {
@@ -36,25 +35,10 @@ MAX_COMPRESSED = 1 << 24
 """Largest size in bytes of a file that is compressed."""
 LEVEL = 4
 """Of compression: 9 takes up to eight times as long for one hundredth less."""
-PIECE = 1 << 18
-"""Bytes that are handed to a connection at once, of which a slow reader leaves many waiting."""
 AT_ONCE = 2
 """Files that are read at a time: voices speak in the same threads."""
 GONE = 499
 """Status of an answer that nobody waits for."""
-
-
-class Content:
-    """The bytes of an answer, shared by all who are being sent them."""
-
-    def __init__(self, data: bytes):
-        """Wraps the bytes of a whole file."""
-        self.data = data
-
-    async def pieces(self) -> AsyncIterator[bytes]:
-        """Yields the bytes in order."""
-        for at in range(0, len(self.data), PIECE):
-            yield self.data[at : at + PIECE]
 
 
 class BundleFiles:

@@ -10,7 +10,7 @@ import asyncio
 import hashlib
 import os
 import re
-from collections.abc import Collection
+from collections.abc import AsyncIterator, Collection
 from functools import lru_cache
 from mimetypes import guess_type
 from pathlib import Path
@@ -18,7 +18,7 @@ from pathlib import Path
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Receive, Scope, Send
 
@@ -34,7 +34,22 @@ LONGEST, DEEPEST = 512, 8
 """Letters and folders of a path that is looked for: the system looks at every folder of it."""
 AT_ONCE = 2
 """Files that are looked for at a time, each in a thread: dozens of them would keep the loop out."""
+PIECE = 1 << 16
+"""Bytes that are handed to a connection at once, of which a slow reader leaves many waiting."""
 WEIGHT = re.compile(r"0(\.\d{0,3})?|1(\.0{0,3})?")
+
+
+class Content:
+    """The bytes of an answer, shared by all who are being sent them."""
+
+    def __init__(self, data: bytes):
+        """Wraps the bytes of a whole file."""
+        self.data = data
+
+    async def pieces(self) -> AsyncIterator[bytes]:
+        """Yields the bytes in order."""
+        for at in range(0, len(self.data), PIECE):
+            yield self.data[at : at + PIECE]
 
 
 class PageFiles(StaticFiles):
@@ -86,7 +101,8 @@ class PageFiles(StaticFiles):
         stat = file.stat() if chosen else stat_result
         media_type = TYPES.get(plain.suffix) or guess_type(plain)[0]
         content, tag = _content(file, stat.st_mtime_ns, stat.st_size)
-        response = Response(content, status_code, media_type=media_type)
+        response = StreamingResponse(content.pieces(), status_code, media_type=media_type)
+        response.headers["Content-Length"] = str(len(content.data))
         response.headers["ETag"] = tag
         response.headers["Cache-Control"] = FOR_EVER if self._hashed in plain.parents else ASK_AGAIN
         if forms:
@@ -123,10 +139,10 @@ def _coding(part: str) -> tuple[str, float]:
 
 
 @lru_cache(maxsize=256)
-def _content(file: Path, changed: int, size: int) -> tuple[bytes, str]:
+def _content(file: Path, changed: int, size: int) -> tuple[Content, str]:
     """A file as it was `changed` (ns), of `size` bytes, and its ETag.
 
     The ETag is of the content: all files of a wheel are of the same second, and often as long.
     """
-    content = file.read_bytes()
-    return content, f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+    data = file.read_bytes()
+    return Content(data), f'"{hashlib.sha256(data).hexdigest()[:32]}"'

@@ -6,11 +6,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
-from shutil import copytree
 
 import numpy as np
 
 from ico3d.body.model_folder import UNTUNED, TrainedBody
+from ico3d.body.planning.flow import copy_cache
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import ONE_WINDOW, SKINNED, BodySettings, Method
 from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
@@ -119,7 +119,7 @@ class Trial:
         settings, device = self.terms.settings(self.method), self.terms.device
         job = BodyJob(self.method, self.seed, settings, device=device)
         # Optical flow is the same for all trials, and was measured when the windows were cut.
-        copytree(self.terms.folder / "flow", self.folder / "flow", dirs_exist_ok=True)
+        copy_cache(self.terms.folder / "flow", self.folder / "flow")
         body = train_body(capture, self.folder, job)
         if not (self.folder / UNTUNED).is_file():
             return {"seed": self.seed} | self._scores(body, capture)

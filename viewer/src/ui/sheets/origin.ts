@@ -12,35 +12,38 @@ export function showOrigin(root: HTMLElement, words: PageWords, provenance: Prov
   new Disclosure(root, 'origin', signal, undefined, 'ai-button');
   const list = byId(root, 'origin').querySelector('dl')!;
   list.replaceChildren(
-    ...rowsOf(provenance).flatMap(([name, value]) => {
-      const [term, told] = [document.createElement('dt'), document.createElement('dd')];
-      words.write(term, say(name));
-      words.write(told, value);
-      return [term, told];
-    }),
+    ...rowsOf(provenance).flatMap(([name, ...values]) => [written('dt', say(name), words), ...values.map((value) => written('dd', value, words))]),
   );
 }
 
-/** What is told, row by row. */
-export function rowsOf(provenance: Provenance): [Key, Sentence][] {
+function written(tag: 'dt' | 'dd', sentence: Sentence, words: PageWords): HTMLElement {
+  const element = document.createElement(tag);
+  words.write(element, sentence);
+  return element;
+}
+
+type Row = [Key, ...Sentence[]];
+
+/** What is told, row by row; sources each on a line, for what is one line is laid out at once. */
+export function rowsOf(provenance: Provenance): Row[] {
   const { consent, sources, licence, made_by, made_on } = provenance;
-  const who: [Key, Sentence][] = isSynthetic(provenance)
+  const who: Row[] = isSynthetic(provenance)
     ? [['origin.likeness', say('origin.nobody')]]
     : [
         ['origin.likeness', told(provenance.likeness)],
         ['origin.consent', told(consent)],
       ];
-  const voice: [Key, Sentence][] = provenance.voice
+  const voice: Row[] = provenance.voice
     ? [
         ['origin.voice', say('origin.cloned', { recording: provenance.voice.recording })],
         ['origin.voice.consent', told(provenance.voice.consent)],
       ]
     : [];
-  return [...who, ...(provenance.parts ?? []).map(ofPart), ...voice, ['origin.sources', told(sources.join('; '))], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
+  return [...who, ...(provenance.parts ?? []).map(ofPart), ...voice, ['origin.sources', ...(sources.length ? sources : ['']).map(told)], ['origin.licence', told(licence)], ['origin.maker', told(made_by)], ['origin.day', told(made_on)]];
 }
 
 /** Whether the head, or the body, was recorded or made. */
-function ofPart(part: Part): [Key, Sentence] {
+function ofPart(part: Part): Row {
   const made = isSynthetic(part);
   return [part.name === 'head' ? 'origin.head' : 'origin.body', made ? say('origin.made') : say('origin.recorded', { whom: part.likeness })];
 }

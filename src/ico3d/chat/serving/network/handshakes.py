@@ -76,6 +76,7 @@ class Handshake(asyncio.Protocol):
             transport.abort()
             return
         inner = prompt.PromptProtocol(**self._served)
+        inner.below = transport
         line.set_protocol(inner)
         inner.connection_made(line)
         for data in self._early:

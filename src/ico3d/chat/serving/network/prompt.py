@@ -53,7 +53,12 @@ class PromptProtocol(HttpToolsProtocol):
     Behind a request that is not answered yet, one more may wait: a client may be that quick. One
     machine may have so many connections open and no more. Those of proxies that the operator
     has stated, and of this machine, are not counted.
+
+    Attributes:
+        below: What carries the connection's TLS; None without.
     """
+
+    below: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Opens the connection, or closes it if its machine has too many, or too many new ones.
@@ -65,6 +70,7 @@ class PromptProtocol(HttpToolsProtocol):
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
+        self._left = 0  # bytes of answers that had not been sent when that was last asked
         self._first: RequestResponseCycle | None = None  # that another one may wait for
         may = transport.get_extra_info("sslcontext") or may_arrive(self._machine)
         if count_in(self._machine) and may:
@@ -163,6 +169,7 @@ class PromptProtocol(HttpToolsProtocol):
         """The next request may follow, and has to soon."""
         super().on_response_complete()
         if not self.transport.is_closing():
+            self._left = 0
             self._await_head()
 
     def handle_websocket_upgrade(self) -> None:
@@ -186,9 +193,20 @@ class PromptProtocol(HttpToolsProtocol):
             self._deadline = None
 
     def _give_up(self) -> None:
+        """Ends the connection, unless an earlier answer is still being read, however slowly."""
         self._deadline = None
-        if self.cycle is None or self.cycle.response_complete:  # else a pipelined one is answered
+        if self.cycle is not None and not self.cycle.response_complete:
+            return  # a pipelined one is answered
+        before, self._left = self._left, self._unsent()
+        if self._left and (self._left < before or not before):
+            self._await_head()
+        else:
             self.transport.abort()
+
+    def _unsent(self) -> int:
+        """Bytes of answers that the system has not taken yet."""
+        lines = (self.transport, self.below)
+        return sum(line.get_write_buffer_size() for line in lines if line is not None)
 
     def _cut_off(self, why: str) -> NoReturn:
         """Closes the connection; the error has the parser leave the rest."""

@@ -1,0 +1,32 @@
+import { describe, expect, test } from 'vitest';
+import { PageError, sentenceOf } from '../../src/errors.ts';
+import { decode } from '../../src/talk/wire.ts';
+import { brief, calm } from '../../src/words/calm.ts';
+
+const letters = 'a'.repeat(10_000);
+
+describe('marks on a letter', () => {
+  test('are as many as writing knows, and a text that has no more stays as it is', () => {
+    const thai = 'ไม่เป็นไร ก็ได้ค่ะ';
+    for (const text of ['Zoë', 'e\u0301\u0323', thai, '👩‍👩‍👧', '日本語']) expect(calm(text)).toBe(text);
+    expect(calm(`a${'\u0301'.repeat(480_000)}b`)).toBe(`a${'\u0301'.repeat(16)}b`);
+  });
+
+  test.each(['\u109a\u200d', '\u{1f3fb}', '\u00ad', '\u{e0061}', '\u0301\u200c', '\uff9e'])('so are joiners, tags, tones of skin and their mixtures: %j', (more) => {
+    expect([...calm(`a${more.repeat(8000)}b`)].length).toBeLessThanOrEqual(2 + 16);
+  });
+
+  test('a text is no longer than is laid out at once, and one within an error is short', () => {
+    expect(calm('\u07da'.repeat(16_000))).toBe(`${'\u07da'.repeat(8000)}…`);
+    expect(brief('a short one')).toBe('a short one');
+    expect(brief(`a${'\u0301'.repeat(480_000)}`)).toBe(`a${'\u0301'.repeat(16)}`);
+    expect(brief(letters)).toBe(`${'a'.repeat(300)}…`);
+    expect(new PageError(letters).sentence).toHaveLength(301);
+    expect(sentenceOf(new Error(letters))).toMatchObject({ values: { detail: `${'a'.repeat(300)}…` } });
+  });
+
+  test('so it is in what a server sends', () => {
+    const said = decode(JSON.stringify({ type: 'transcript', text: `a${'\u0301'.repeat(9000)}`, final: false }));
+    expect(said).toMatchObject({ text: `a${'\u0301'.repeat(16)}` });
+  });
+});
