@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import torch
 import tyro
 from make_demo import check, write_person
 
@@ -49,7 +48,6 @@ class Renewal:
     body_capture: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
 
-    @torch.no_grad()
     def run(self) -> None:
         """Bakes the head, puts it on, writes and checks the bundle."""
         bundle, trained = Bundle.open(self.old), TrainedHead.load(self.head)

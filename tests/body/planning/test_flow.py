@@ -1,12 +1,19 @@
 """How much moves, and where."""
 
+import os
 import sys
 
 import cv2
 import numpy as np
 import pytest
 
-from ico3d.body.planning.flow import MOST_CACHED, clip_flow, copy_cache, dynamic_weights
+from ico3d.body.planning.flow import (
+    MOST_CACHED,
+    MOST_CAMERAS,
+    clip_flow,
+    copy_cache,
+    dynamic_weights,
+)
 from ico3d.body.planning.flow_methods import DisFlow, best_method
 from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError, MissingExtraError, ModelError
@@ -212,6 +219,17 @@ def test_the_cache_of_a_folder_that_somebody_else_began_is_copied_by_its_names_a
     copy_cache(source, target)
     assert {file.name: file.read_bytes() for file in target.iterdir()} == {names[0]: b"measured"}
     copy_cache(tmp_path / "none", target)  # nothing was measured yet
+
+
+def test_no_more_flow_is_copied_than_one_clip_has(tmp_path):
+    (tmp_path / "flow").mkdir()
+    for number in range(MOST_CAMERAS + 5):
+        file = tmp_path / "flow" / f"{number:024x}.npz"
+        file.write_bytes(b"measured")
+        os.utime(file, (1e9 + number, 1e9 + number))
+    copy_cache(tmp_path / "flow", tmp_path / "other")
+    copied = sorted(int(file.stem, 16) for file in (tmp_path / "other").iterdir())
+    assert copied == list(range(5, MOST_CAMERAS + 5))
 
 
 def test_no_flow_is_written_through_a_link(tmp_path):

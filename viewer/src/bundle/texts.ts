@@ -1,5 +1,3 @@
-import { LONGEST } from '../words/calm.ts';
-
 /** Whose the head or the body is, where they come from different people. */
 export interface Part {
   name: 'head' | 'body';
@@ -39,7 +37,8 @@ interface Told {
 
 // UTF-16 units, twice as many as the letters that servers allow: a letter beyond the first plane has two
 const NAME = 400;
-const ORIGIN = { text: 4000, all: 16_000 };
+const GREETING = 8000;
+const ORIGIN = { text: 4000, all: 20_000 };
 const MOST = { languages: 100, suggestions: 12, sources: 1000, parts: 16 };
 const LANGUAGE = /^[A-Za-z]{2,8}(-[A-Za-z0-9]{1,8})*$/;
 
@@ -49,11 +48,12 @@ export function badText({ name, persona, provenance }: Told): string | null {
   const lists: Record<string, boolean> = {
     name: isText(name, NAME),
     'persona.name': isText(persona?.name, NAME),
-    'persona.greeting': isText(persona?.greeting, LONGEST),
+    'persona.greeting': isText(persona?.greeting, GREETING),
     'persona.languages': areTexts(persona?.languages ?? [], MOST.languages, NAME, LANGUAGE),
     'persona.suggestions': areTexts(persona?.suggestions ?? [], MOST.suggestions, NAME),
-    'provenance.sources': areTexts(sources, MOST.sources, ORIGIN.text) && sum(sources) <= ORIGIN.all,
+    'provenance.sources': areTexts(sources, MOST.sources, ORIGIN.text),
     'provenance.parts': parts === undefined || (Array.isArray(parts) && parts.length <= MOST.parts),
+    provenance: lengthOf(provenance) <= ORIGIN.all,
   };
   const wrong = Object.keys(lists).find((key) => !lists[key]);
   if (wrong) return wrong;
@@ -72,9 +72,10 @@ function badIn(where: string, value: object | null, needed: string[], others: st
   return wrong ? `${where}.${wrong}` : null;
 }
 
-/** How long texts are together. */
-function sum(texts: readonly string[]): number {
-  return texts.reduce((all, text) => all + text.length, 0);
+/** How long all texts in what JSON can hold are together. */
+function lengthOf(value: unknown): number {
+  if (typeof value === 'string') return value.length;
+  return value && typeof value === 'object' ? Object.values(value).reduce<number>((all, one) => all + lengthOf(one), 0) : 0;
 }
 
 function isText(value: unknown, most: number): boolean {

@@ -21,12 +21,12 @@ export interface RecordEvents {
 
 const CUT = ' …';
 const ENDED = /[.!?。！？…]["'”’»)]*\s*$/; // answers come clause by clause
-const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]/; // of scripts that put no spaces between sentences
+const JOINED = /[\u3000-\u3029\u3030-\u3098\u309b-\u30ff\u3400-\u9fff\uff00-\uff9d\uffa0-\uffef]/; // of scripts that put no spaces between sentences, but no marks
 const MOST_ENTRIES = 1000;
 /** Entries of talks before this one. */
 const MOST_EARLIER = 200;
 /** Letters of an answer that are kept, and clauses of a sentence that goes on: servers say 4,000 at most. */
-const MOST_LETTERS = 20_000;
+const MOST_LETTERS = 8000;
 const MOST_BEFORE = 4000;
 
 /** All that was said in a talk, as far as it was heard, and in the talks before it. */

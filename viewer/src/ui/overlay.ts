@@ -1,5 +1,6 @@
 import type { Part } from '../bundle/load.ts';
 import { nameOf, type Manifest } from '../bundle/manifest.ts';
+import { smallPicture } from '../bundle/thumbnail.ts';
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
@@ -57,11 +58,20 @@ export class Overlay {
     byId(this.root, 'overlay-name').textContent = nameOf(manifest);
     const crop = headInThumbnail(manifest);
     if (crop) this.thumbnail.style.transform = `scale(${1 / crop.side}) translate(${-100 * crop.left}%, ${-100 * crop.top}%)`;
-    this.thumbnail.crossOrigin = 'anonymous'; // it may be another server's
-    this.thumbnail.src = thumbnail;
-    this.thumbnail.onload = () => (this.thumbnail.hidden = false);
+    void this.picture(thumbnail);
     this.tellLanguages(manifest);
     this.words.onChange(() => this.tellLanguages(manifest), this.signal);
+  }
+
+  private async picture(thumbnail: string): Promise<void> {
+    const small = await smallPicture(thumbnail, this.signal);
+    if (!small) return;
+    const address = URL.createObjectURL(small);
+    this.thumbnail.onload = () => {
+      URL.revokeObjectURL(address);
+      this.thumbnail.hidden = false;
+    };
+    this.thumbnail.src = address;
   }
 
   /** Says which languages somebody speaks who does not speak the page's. */

@@ -22,7 +22,7 @@ describe('texts of a bundle', () => {
     ['persona.languages', { ...good, persona: { ...good.persona, languages: [''] } }],
     ['persona.suggestions', { ...good, persona: { ...good.persona, suggestions: Array<string>(13).fill('?') } }],
     ['provenance.sources', { ...good, provenance: { ...good.provenance, sources: [letters] } }],
-    ['provenance.sources', { ...good, provenance: { ...good.provenance, sources: Array<string>(9).fill('a'.repeat(2000)) } }],
+    ['provenance', { ...good, provenance: { ...good.provenance, sources: Array<string>(6).fill('a'.repeat(3900)) } }],
     ['provenance.likeness', { ...good, provenance: { ...good.provenance, likeness: letters } }],
     ['provenance.parts', { ...good, provenance: { ...good.provenance, parts: Array(46_000).fill(good.provenance.parts[0]) } }],
     ['provenance.parts.likeness', { ...good, provenance: { ...good.provenance, parts: [{ name: 'head' as const, kind: '', likeness: letters }] } }],

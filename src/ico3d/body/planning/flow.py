@@ -42,7 +42,7 @@ PERSON = 200.0
 VERSION = 1
 """Version of cached results, to be counted up when the measurement changes."""
 
-CACHED, MOST_CACHED = re.compile(r"[0-9a-f]{24}\.npz"), 1 << 26
+CACHED, MOST_CACHED = re.compile(r"[0-9a-f]{24}\.npz"), 1 << 24
 """Names of cached files, and bytes of the largest that is copied."""
 
 logger = logging.getLogger(__name__)
@@ -147,16 +147,21 @@ def clip_flow(
 def copy_cache(source: Path, target: Path) -> None:
     """Copies measured flow to where another training of the same clip looks for it.
 
-    Either folder may have been begun by somebody else: nothing but regular files that are named as
-    the cache's and no larger than `MOST_CACHED` is copied, and no link is followed.
+    Either folder may have been begun by somebody else: of regular files that are named as the
+    cache's and no larger than `MOST_CACHED`, the newest are copied, as many as one clip has, and no
+    link is followed.
 
     Raises:
         ModelError: If the target is a link.
     """
     if target.is_symlink():
         raise ModelError(f"{target} is a link: what is measured would be written elsewhere.")
-    for file in sorted(source.glob("*.npz")) if not source.is_symlink() else ():
-        if CACHED.fullmatch(file.name) and not (target / file.name).exists():
+    if source.is_symlink():
+        return
+    cached = [file for file in source.glob("*.npz") if CACHED.fullmatch(file.name)]
+    newest = sorted(cached, key=lambda file: file.lstat().st_mtime_ns)[-MOST_CAMERAS:]
+    for file in newest:
+        if not (target / file.name).exists():
             with contextlib.suppress(OSError):  # no file of ours: it is measured again
                 write_atomic(target / file.name, read_small(file, links=False, most=MOST_CACHED))
 

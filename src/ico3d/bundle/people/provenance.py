@@ -13,8 +13,8 @@ SYNTHETIC = "synthetic"
 """Kind of a recording that shows nobody: the person was modelled, and filmed inside a computer."""
 OPENVOICE = "openvoice-v2"
 """The engine of cloned voices."""
-LONGEST_TEXT, LONGEST_SOURCES, MOST_SOURCES, MOST_PARTS = 2_000, 8_000, 1_000, 16
-"""Letters of each text and of all sources, and numbers of entries; pages allow as much
+LONGEST_TEXT, LONGEST_IN_ALL, MOST_SOURCES, MOST_PARTS = 2_000, 10_000, 1_000, 16
+"""Letters of each text and of all texts, and numbers of entries; pages allow as much
 (`viewer/src/bundle/texts.ts`), for laying out a text takes the square of its length."""
 
 
@@ -136,14 +136,13 @@ def check_texts(provenance: Provenance) -> None:
     Raises:
         BundleError: If one is longer, or there are too many.
     """
-    told = plain(provenance)
+    texts = list(_texts(plain(provenance)))
     few = len(provenance.sources) <= MOST_SOURCES and len(provenance.parts) <= MOST_PARTS
-    few = few and sum(map(len, provenance.sources)) <= LONGEST_SOURCES
-    if not few or any(len(text) > LONGEST_TEXT for text in _texts(told)):
+    few = few and sum(map(len, texts)) <= LONGEST_IN_ALL
+    if not few or any(len(text) > LONGEST_TEXT for text in texts):
         raise BundleError(
-            f"manifest.json: provenance must have at most {MOST_SOURCES} sources of "
-            f"{LONGEST_SOURCES} letters in all, {MOST_PARTS} parts, and texts of at most "
-            f"{LONGEST_TEXT} letters."
+            f"manifest.json: provenance must have at most {MOST_SOURCES} sources, {MOST_PARTS} "
+            f"parts, and texts of at most {LONGEST_TEXT} letters, {LONGEST_IN_ALL} in all."
         )
 
 

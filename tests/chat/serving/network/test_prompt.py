@@ -2,9 +2,11 @@
 
 import asyncio
 import contextlib
+import gc
 import re
 import socket
 import time
+import weakref
 from pathlib import Path
 
 import pytest
@@ -151,6 +153,30 @@ async def test_who_leaves_while_a_request_waits_is_not_worked_for(unread):
     assert await seconds_until_over(tasks) < 2
 
 
+async def test_a_request_that_waited_leaves_nothing_behind(unread, monkeypatch):
+    port, tasks = unread
+    lines = []
+    made = prompt.PromptProtocol.connection_made
+
+    def remembered(self, transport):
+        lines.append(weakref.ref(self))
+        made(self, transport)
+
+    monkeypatch.setattr(prompt.PromptProtocol, "connection_made", remembered)
+    gc.collect()
+    gc.disable()
+    try:
+        async with connected(port) as (_, writer):
+            writer.write((b"GET /nothing" + HOST + b"\r\n") * 2)
+            while not tasks:
+                await asyncio.sleep(0.01)
+            await asyncio.sleep(0.1)
+        await seconds_until_over(tasks)
+        await until(lambda: lines[0]() is None)
+    finally:
+        gc.enable()
+
+
 async def test_one_request_may_wait_for_another(port):
     async with connected(port) as (reader, writer):
         writer.write((REQUEST % port + b"\r\n") * 2)
@@ -271,6 +297,18 @@ async def test_a_body_in_crumbs_is_cut_off_whether_it_is_read_or_not(port, unrea
                 writer.write(b"1\r\nx\r\n" * 50)
                 await writer.drain()
                 await asyncio.sleep(0.01)
+        assert await closed < 2
+
+
+async def test_what_has_come_in_large_pieces_allows_no_more_crumbs(unread):
+    port, _ = unread
+    async with connected(port) as (reader, writer):
+        writer.write(b"POST /length" + HOST + b"Transfer-Encoding: chunked\r\n\r\n")
+        writer.write(b"%x\r\n%s\r\n" % (1 << 20, bytes(1 << 20)))
+        closed = asyncio.create_task(seconds_until_closed(reader))
+        with contextlib.suppress(ConnectionError):
+            writer.write(b"1\r\nx\r\n" * 2 * prompt.PIECES)
+            await writer.drain()
         assert await closed < 2
 
 

@@ -20,8 +20,8 @@ HEAD = 10.0  # s for the head of a request
 LARGEST_HEAD = 1 << 16  # bytes
 MOST_HEADERS = 200  # of a request, those behind its body included
 PIECES, SMALL = 200, 512
-"""Pieces of a request's body after which they must have so many bytes on average: each costs this
-process time, however small it is, and a chunk of one byte is a piece."""
+"""Small pieces that a request's body may have at once, and bytes of others that allow one more:
+each costs this process time, however small it is, and a chunk of one byte is a piece."""
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 RATE, AT_ONCE = 32.0, 256.0
 """New connections of one machine in a second, and at once: a browser opens six for a page, and
@@ -86,6 +86,9 @@ class PromptProtocol(HttpToolsProtocol):
             self._first.disconnected = True
             self._first.message_event.set()
         super().connection_lost(exc)
+        for cycle, _ in self.pipeline:  # never begun: uvicorn would leave a circle of references
+            cycle.on_response = _nothing
+        self.pipeline.clear()
 
     def data_received(self, data: bytes) -> None:
         """Takes bytes, unless they make a head too large."""
@@ -142,7 +145,7 @@ class PromptProtocol(HttpToolsProtocol):
         self._within_head = False
         self._stop_waiting()
         self._head_bytes = 0
-        self._pieces = self._body_bytes = 0
+        self._pieces_left = float(PIECES)
         before = self.cycle
         super().on_headers_complete()
         self._first = before if self.pipeline else self.cycle
@@ -154,9 +157,8 @@ class PromptProtocol(HttpToolsProtocol):
             ProtocolError: If the body comes in too many small ones; the connection is closed.
         """
         self._head_bytes = 0
-        self._pieces += 1
-        self._body_bytes += len(body)
-        if self._pieces > PIECES and self._body_bytes < SMALL * self._pieces:
+        self._pieces_left = min(PIECES, self._pieces_left + len(body) / SMALL) - 1
+        if self._pieces_left < 0:
             self._cut_off("a body in crumbs.")
         super().on_body(body)
 
@@ -217,6 +219,10 @@ class PromptProtocol(HttpToolsProtocol):
         if self._counted:
             self._counted = False
             count_out(self._machine)
+
+
+def _nothing() -> None:
+    """Takes the place of what would have been told of a request that is dropped."""
 
 
 def may_arrive(machine: str) -> bool:
