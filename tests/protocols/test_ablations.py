@@ -69,6 +69,8 @@ def test_heads_without_a_part(tmp_path, monkeypatch):
 def test_bodies_share_windows_and_flow(tmp_path, monkeypatch):
     """Every ablation is a trial of the comparison of methods, in a folder of its own."""
     (tmp_path / "flow").mkdir()
+    measured = f"{7:024x}.npz"
+    (tmp_path / "flow" / measured).touch()
     ran = []
 
     def terms_for(capture, frames, folder, settings, *rest, **named):
@@ -98,4 +100,4 @@ def test_bodies_share_windows_and_flow(tmp_path, monkeypatch):
     ]
     settings = [ours for *_, ours in ran]
     assert all(isinstance(ours, BodySettings) for ours in settings)
-    assert settings[2].warmup_steps == 0 and (tmp_path / "no-encoder" / "flow").is_dir()
+    assert settings[2].warmup_steps == 0 and (tmp_path / "no-encoder/flow" / measured).is_file()

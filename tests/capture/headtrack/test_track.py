@@ -107,7 +107,7 @@ def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     if not PERSON.is_file():
         pytest.skip("../shared/subjects is not here")
     shape = dict(subject=str(PERSON), rig="body", cameras=5, views_per_frame=5)
-    truth, folder = _recorded(tmp_path, frames=2, fps=15.0, size=576, **shape)
+    truth, folder = _recorded(tmp_path, frames=2, fps=15.0, size=704, **shape)
     assert main(["capture", "track", str(folder)]) == 0
     degrees, metres = _agreement(truth, open_capture(folder))
     assert degrees.max() < 2.0 and metres.max() < 0.005

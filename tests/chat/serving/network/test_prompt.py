@@ -4,14 +4,13 @@ import asyncio
 import contextlib
 import gc
 import re
-import socket
 import time
 import weakref
 from pathlib import Path
 
 import pytest
 from fastapi import FastAPI, Request
-from fastapi.responses import FileResponse, Response
+from fastapi.responses import FileResponse
 from websockets.server import ServerProtocol
 
 import ico3d
@@ -363,27 +362,6 @@ async def test_one_machine_opens_so_many_connections_and_no_more(port, monkeypat
         assert (await reader.readline()).startswith(b"HTTP/1.1 200")
     await asyncio.sleep(1)
     assert prompt._open["10.0.0.7"] == 0
-
-
-@pytest.mark.parametrize("reads", [True, False])
-async def test_an_answer_arrives_as_a_whole_for_who_reads_it_slowly(monkeypatch, reads):
-    monkeypatch.setattr(prompt, "HEAD", 0.3)
-    size, speed = 200_000, 150_000
-    app, line = FastAPI(), socket.socket()
-    app.add_api_route("/page", lambda: Response(bytes(size)))
-    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    line.setblocking(False)
-    loop, came = asyncio.get_running_loop(), 0
-    async with running(app) as (_, listener):
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-        await loop.sock_connect(line, listener.getsockname())
-        await loop.sock_sendall(line, b"GET /page" + HOST + b"\r\n")
-        await asyncio.sleep(0 if reads else 1.5)
-        with line, contextlib.suppress(ConnectionResetError):
-            while came <= size and (piece := await loop.sock_recv(line, 4096)):
-                came += len(piece)
-                await asyncio.sleep(len(piece) / speed)
-    assert (came > size) == reads
 
 
 async def test_who_connects_and_leaves_without_a_pause_is_turned_away(port, monkeypatch):

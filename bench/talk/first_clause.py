@@ -4,7 +4,7 @@ A scripted language model of known speed writes answers (four characters a token
 after one token's time), the voice is espeak-ng, and the time runs until its first sound. The gap
 is the silence behind the first clause where the model is too slow for the rest of its sentence.
 
-    python bench/first_clause.py
+    python bench/talk/first_clause.py
 """
 
 import asyncio
