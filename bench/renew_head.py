@@ -16,17 +16,15 @@ import tyro
 from make_demo import check, write_person
 
 from ico3d.avatar.baking import head_bundle
-from ico3d.avatar.baking.person_bundle import moved_head
-from ico3d.avatar.baking.samples import expressions_at, references_around, samples_around
+from ico3d.avatar.baking.person_bundle import moved_head, recorded_head
+from ico3d.avatar.joining.assemble import align
 from ico3d.avatar.joining.cropping import cropped
-from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.capture.capture import Capture
-from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.capture.face.region import HeadRegion
 from ico3d.capture.formats import open_capture
 from ico3d.cli import run_script
-from ico3d.errors import CaptureError, ModelError
+from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 
 
@@ -56,10 +54,10 @@ class Renewal:
             raise ModelError(f"{self.old} is no whole person on a skeleton.")
         if trained.landmarks is None or adaptor is None:
             raise ModelError(f"{self.head} has no landmarks, or is not driven by speech.")
-        placed = _place(trained.landmarks, open_capture(self.body_capture))
+        placed = align(open_capture(self.body_capture), trained.landmarks, print)
         trained = cropped(trained, HeadRegion.around(trained.landmarks))
         result, idle = _baked(trained, open_capture(self.head_capture))
-        head = head_bundle.driven(moved_head(result.head, placed), trained)
+        head = head_bundle.driven(moved_head(result.head, placed.canonical_from_head), trained)
         onnx, speech = head_bundle.speech_file(adaptor, trained.encoder)
         info = head_bundle.head_info(head, trained, idle, old.fps, old.num_poses)
         manifest = replace(bundle.manifest, head=info, speech=speech, loss=result.loss)
@@ -67,22 +65,9 @@ class Renewal:
         check(self.out)
 
 
-def _place(landmarks: np.ndarray, body: Capture) -> np.ndarray:
-    """(4, 4) from a head model's space, with these landmarks, to the head space of a recording."""
-    there = canonical_landmarks(body)
-    if there is None:
-        raise CaptureError(f"{body.path} has no landmarks of the face.")
-    matrix, rest = canonical_from_head(there, landmarks)
-    print(fit_in_words(matrix, rest))
-    return matrix
-
-
 def _baked(head: TrainedHead, capture: Capture) -> tuple[head_bundle.BakedResult, np.ndarray]:
     """The baked head, in the space of its model, and its (B,) expression at rest."""
-    track, split = head.track(capture), capture.split
-    samples = samples_around(head, expressions_at(track, split.train))
-    tests = expressions_at(track, split.test or split.train)
-    views = references_around(head, tests, head_bundle.MEASURED_VIEWS)
+    samples, views = recorded_head(head, capture)
     result = head_bundle.bake(head, views, samples, None, print)
     head_bundle.check(result)
     return result, head_bundle.idle_expression(head, samples.expressions)

@@ -52,6 +52,26 @@ def test_closed_sockets_no_longer_count():
         assert may == [True, False, True, True, True]
 
 
+async def sent_to(guard, address, kind, received, told):
+    """A request or handshake of an address that waits for the application, and what is answered.
+
+    Of messages that come back, the entry `told` is kept.
+    """
+    sent = []
+
+    async def send(message):
+        sent.append(message.get(told))
+
+    async def receive():
+        return {"type": received}
+
+    headers = [(b"host", b"10.0.0.1:8765")]
+    scope = {"type": kind, "path": "/ws", "query_string": b"", "headers": headers}
+    task = asyncio.create_task(guard(scope | {"client": (address, 1)}, receive, send))
+    await asyncio.sleep(0)
+    return task, sent
+
+
 async def test_silent_sockets_of_one_machine_leave_room_for_others():
     held = asyncio.Event()
 
@@ -62,19 +82,7 @@ async def test_silent_sockets_of_one_machine_leave_room_for_others():
     guard = Guard(app, "0.0.0.0")
 
     async def come(address):
-        sent = []
-
-        async def send(message):
-            sent.append(message["type"])
-
-        async def receive():
-            return {"type": "websocket.connect"}
-
-        headers = [(b"host", b"10.0.0.1:8765")]
-        scope = {"type": "websocket", "path": "/ws", "query_string": b"", "headers": headers}
-        task = asyncio.create_task(guard(scope | {"client": (address, 1)}, receive, send))
-        await asyncio.sleep(0)
-        return task, sent
+        return await sent_to(guard, address, "websocket", "websocket.connect", "type")
 
     many = [await come("10.0.0.7") for _ in range(MOST_SOCKETS)]
     refused = await come("10.0.0.7")
@@ -97,19 +105,7 @@ async def test_requests_of_one_machine_that_are_worked_on_are_counted():
     guard = Guard(app, "0.0.0.0")
 
     async def ask(address):
-        sent = []
-
-        async def send(message):
-            sent.append(message.get("status"))
-
-        async def receive():
-            return {"type": "http.disconnect"}
-
-        headers = [(b"host", b"10.0.0.1:8765")]
-        scope = {"type": "http", "path": "/", "query_string": b"", "headers": headers}
-        task = asyncio.create_task(guard(scope | {"client": (address, 1)}, receive, send))
-        await asyncio.sleep(0)
-        return task, sent
+        return await sent_to(guard, address, "http", "http.disconnect", "status")
 
     many = [await ask("10.0.0.7") for _ in range(MOST_REQUESTS)]
     refused, neighbour = await ask("10.0.0.7"), await ask("10.0.0.8")

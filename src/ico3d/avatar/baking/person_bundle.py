@@ -32,6 +32,7 @@ from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import CameraInfo, Loss, Manifest, Persona
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians
 
 VIEWS = 40
@@ -75,17 +76,27 @@ def head_samples(
     Raises:
         MissingExtraError: If synthetic voices are needed and espeak-ng is not installed.
     """
-    head, tests = avatar.head, avatar.expressions
-    expressions = avatar.expressions
+    head, expressions = avatar.head, avatar.expressions
     if capture is not None:
-        track, split = head.track(capture), capture.split
-        expressions = expressions_at(track, split.train)
-        tests = expressions_at(track, split.test or split.train)
-    elif head.adaptor is not None:
+        return recorded_head(head, capture)
+    if head.adaptor is not None:
         expressions = np.concatenate([expressions, spoken_expressions(head, spoken_texts(persona))])
-    return samples_around(head, expressions), references_around(
-        head, tests, head_bundle.MEASURED_VIEWS
-    )
+    return _around(head, expressions, avatar.expressions)
+
+
+def recorded_head(head: TrainedHead, capture: Capture) -> tuple[Samples, list[head_cost.Reference]]:
+    """As `head_samples`, of a head and its recording."""
+    track, split = head.track(capture), capture.split
+    tests = expressions_at(track, split.test or split.train)
+    return _around(head, expressions_at(track, split.train), tests)
+
+
+def _around(
+    head: TrainedHead, expressions: np.ndarray, tests: np.ndarray
+) -> tuple[Samples, list[head_cost.Reference]]:
+    """Samples from expressions (T, B), and pictures with others (V, B)."""
+    samples = samples_around(head, expressions)
+    return samples, references_around(head, tests, head_bundle.MEASURED_VIEWS)
 
 
 def head_at(avatar: TrainedAvatar) -> body_cost.HeadAt:

@@ -11,7 +11,7 @@ from pathlib import Path
 from weakref import WeakValueDictionary
 
 from fastapi import Request, Response
-from fastapi.responses import PlainTextResponse, StreamingResponse
+from fastapi.responses import PlainTextResponse
 
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST
@@ -74,8 +74,7 @@ class BundleFiles:
         except BundleError as error:
             return PlainTextResponse(f"{error}\n", 500)
         media_type = TYPES.get(Path(name).suffix, "application/octet-stream")
-        headers["Content-Length"] = str(len(content.data))
-        return StreamingResponse(content.pieces(), media_type=media_type, headers=headers)
+        return content.answer(200, media_type, headers)
 
     def _plain(self, name: str) -> Content:
         """A file as it is; who asks while others are being sent it shares their bytes."""

@@ -10,7 +10,7 @@ import asyncio
 import hashlib
 import os
 import re
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator, Collection, Mapping
 from functools import lru_cache
 from mimetypes import guess_type
 from pathlib import Path
@@ -46,7 +46,14 @@ class Content:
         """Wraps the bytes of a whole file."""
         self.data = data
 
-    async def pieces(self) -> AsyncIterator[bytes]:
+    def answer(
+        self, status: int, media_type: str | None, headers: Mapping[str, str] | None = None
+    ) -> Response:
+        """An answer of these bytes, which wait for their reader."""
+        length = {"Content-Length": str(len(self.data))}
+        return StreamingResponse(self._pieces(), status, {**(headers or {}), **length}, media_type)
+
+    async def _pieces(self) -> AsyncIterator[bytes]:
         """Yields the bytes in order."""
         for at in range(0, len(self.data), PIECE):
             yield self.data[at : at + PIECE]
@@ -101,8 +108,7 @@ class PageFiles(StaticFiles):
         stat = file.stat() if chosen else stat_result
         media_type = TYPES.get(plain.suffix) or guess_type(plain)[0]
         content, tag = _content(file, stat.st_mtime_ns, stat.st_size)
-        response = StreamingResponse(content.pieces(), status_code, media_type=media_type)
-        response.headers["Content-Length"] = str(len(content.data))
+        response = content.answer(status_code, media_type)
         response.headers["ETag"] = tag
         response.headers["Cache-Control"] = FOR_EVER if self._hashed in plain.parents else ASK_AGAIN
         if forms:
