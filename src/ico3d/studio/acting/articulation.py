@@ -48,7 +48,7 @@ STRENGTH |= dict.fromkeys(("DD", "kk", "nn"), 0.6)
 """How firmly a viseme holds its shape against its neighbours (dominance)."""
 UNKNOWN_STRENGTH = 0.05
 
-STRESSED, UNSTRESSED = 1.1, 0.85
+STRESSED, UNSTRESSED = 1.25, 0.9
 
 
 def articulate(

@@ -70,7 +70,7 @@ RELAXED_ARMS = {
 }
 """Rotations that lower the arms of the rest pose: degrees about X, Y, Z, X applied first."""
 
-AWAKE = 0.4
+AWAKE = 0.25
 """Part of the shape that widens the eyes that a face at rest has: the files' lids hang low."""
 LOWER_TEETH = 0.0016
 """Metres by which teeth lie lower than in the files, whose upper ones hide behind the lip."""

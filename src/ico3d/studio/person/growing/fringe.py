@@ -7,7 +7,7 @@ from ico3d.studio.person.growing.styles import Paths, clumped, smooth, unit, wav
 from ico3d.studio.person.growing.tied import locks
 
 POINTS = 20
-LOCKS = 46
+LOCKS = 58
 """Locks of a fringe: strands of one hang together, and differ in tone and length from others."""
 PARTING = np.radians(7.0)
 """Where it is parted, from the middle of the face to the left."""
@@ -51,8 +51,8 @@ def curtain(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Pat
     above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)  # (N,)
     points = skull.on(ways, above[:, None] * np.exp(-6 * t) + 0.0008 + lift)
     for one in (parted >= 0, parted < 0):
-        points[one] = clumped(points[one], 0.15, 90, 0.62)
-    points += 0.0030 * waves(LOCKS, POINTS, 0.6, random)[lock]
+        points[one] = clumped(points[one], 0.15, 70, 0.8)
+    points += 0.0042 * waves(LOCKS, POINTS, 0.75, random)[lock]
     points += 0.0012 * waves(count, POINTS, 0.7, random)
     depth = np.clip(1 - level + 0.2 * edge, 0, 1)[:, None] * np.minimum(1, 4 * t)
     taper = np.broadcast_to(0.9 - 0.7 * t**2, depth.shape)
@@ -81,7 +81,7 @@ def _falling(
     out = np.clip(np.abs(parted) / WIDEST, 0, 1)  # 0 at the parting
     aim = 61 + 13 * out + 6.0 * of_lock[:, 0] + 3.0 * random.standard_normal(count)
     aim = np.where(parted < 0, -1.0, 1.0) * np.radians(aim)
-    low = 30 + 20 * out + 11.0 * of_lock[:, 1] + 5.0 * random.standard_normal(count)
+    low = 24 + 22 * out + 16.0 * of_lock[:, 1] + 5.0 * random.standard_normal(count)
     low = -np.radians(np.clip(low, -5, 62))
     t = np.linspace(0, 1, POINTS)
     down = t ** (1.25 + 0.2 * random.standard_normal(LOCKS)[lock])[:, None]
