@@ -149,6 +149,18 @@ def test_hands_go_where_they_are_meant_to(made):
     assert places["left_wrist"][0] - places["right_wrist"][0] > 0.6
 
 
+def test_the_right_one_of_two_hands_leads_and_neither_is_the_other_s_mirror_image(made):
+    person, clips = made.person, made.clips
+    for name in ("open_hands", "beat_both", "beat_both_2", "welcome", "big", "small"):
+        clip = clips[name]
+        stroke = clip.marks.stroke
+        places = person.posed(posed(person, clip, np.array([stroke - 0.12, stroke])), np.zeros(3))
+        sides = [places[f"{side}_wrist"] for side in ("right", "left")]
+        ahead, behind = (np.linalg.norm(wrist[1] - wrist[0]) for wrist in sides)
+        assert ahead < 0.7 * behind, name  # the right one has less of its way left
+        assert 0.02 < sides[0][1, 1] - sides[1][1, 1] < 0.15, name
+
+
 def test_a_head_nods_down_and_shakes_to_the_side(made):
     person, clips = made.person, made.clips
     for name, axis in (("nod", 1), ("shake", 0)):

@@ -1,6 +1,7 @@
 """What a page gets to move somebody: a figure that belongs to the rig, and gestures."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from ico3d.motion.clip import Clip, Marks, to_bytes
 from ico3d.motion.curves import Curve
 from ico3d.motion.figure import alike, figure_of
 from ico3d.motion.living import living
-from ico3d.motion.repertoire import clips_for, hung_of, repertoire_bytes
+from ico3d.motion.repertoire import clips_for, hung_of, preferring, repertoire_bytes
 from ico3d.motion.roles import ROLES
+from ico3d.motion.standing import APART_BEFORE, stance_of
 from ico3d.rig.quaternions import IDENTITY, from_rotvec, multiply
 from ico3d.rig.rig import Rig
 from support.rigs import rig_of
@@ -46,6 +48,18 @@ def test_another_rig_is_refused(rig, content):
     for other in (taller, rig_of("MakeHuman", 40.0), rig_of("SMPL-X", 45.0)):
         with pytest.raises(SettingsError, match="another rig"):
             clips_for(content, other)
+
+
+def test_where_people_stood_in_files_of_earlier_versions_is_taken(rig):
+    somebody = living(rig, 3)
+    for apart, taken in ((APART_BEFORE, True), (1.1, False)):
+        stood = replace(somebody, stance=stance_of(somebody.person, apart))
+        content = repertoire_bytes(stood, CLIPS)
+        if taken:
+            assert set(clips_for(content, rig)) == set(CLIPS)
+        else:
+            with pytest.raises(SettingsError, match="another rig"):
+                clips_for(content, rig)
 
 
 @pytest.mark.parametrize("figure", [None, "", "[", '{"height": NaN}'])
@@ -106,3 +120,9 @@ def test_arms_that_hang_in_no_rotations_are_refused(rig, content, hung):
     about["figure"] = json.dumps({**json.loads(about["figure"]), "hung": hung})
     with pytest.raises(SettingsError, match="does not say how arms hang"):
         clips_for(save(load(content), about), rig)
+
+
+def test_a_recorded_gesture_replaces_all_takes_of_the_package():
+    nod = CLIPS["nod"]
+    others = {"nod": nod, "nod_2": nod, "beat_left": nod, "beat_left_2": nod, "wave": nod}
+    assert set(preferring({"nod": nod, "beat_right": nod}, others)) == {"nod", "beat_right", "wave"}

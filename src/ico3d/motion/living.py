@@ -20,9 +20,9 @@ BREATH = 4.1
 """Duration of a breath in seconds: 15 per minute, as of people at rest."""
 WEIGHT = 9.7
 """Period in seconds of the quickest of the sines that shift the weight."""
-SHIFT = 0.015
+SHIFT = 0.02
 """Displacement of the hips to each side, relative to `Person.height`."""
-DROP = 0.0055
+DROP = 0.0075
 """How far the hips sink when the weight is on one leg, relative to height."""
 SWAY = 0.003
 """Displacement of the hips forwards and back, relative to height."""
@@ -87,7 +87,7 @@ class Living:
 
     def _turn_torso(self, times: Array, breath: Array, weight: Array, pose: Array) -> None:
         zero = np.zeros_like(times)
-        roll = np.radians(3.4) * weight
+        roll = np.radians(5.0) * weight
         hips = np.stack([zero, zero, roll], -1) + self._vector(times, 12.7, 10, (0.5, 1.2, 0.2))
         spine = np.stack([zero, zero, -0.9 * roll], -1)
         chest = np.stack([_BREATHING[0] * breath, zero, -0.5 * roll], -1)
@@ -105,11 +105,11 @@ class Living:
             channel = 20 + 10 * number
             lifted = about(forward, sign * _BREATHING[2] * (0.5 + 0.5 * breath))
             pose[..., INDEX[f"{side}_clavicle"], :] = lifted
-            swing = about(sidewards, np.radians(1.5) * self._wander(times, 7.3, channel))
+            swing = about(sidewards, np.radians(2.5) * self._wander(times, 7.3, channel))
             away = 0.5 + 0.5 * self._wander(times, 9.1, channel + 1)
             swing = multiply(about(forward, sign * np.radians(1.2) * away), swing)
-            bend = about(HINGE, np.radians(2.5) * self._wander(times, 6.1, channel + 2))
-            turn = about(DOWN, sign * np.radians(4.0) * self._wander(times, 8.3, channel + 3))
+            bend = about(HINGE, np.radians(5.0) * self._wander(times, 6.1, channel + 2))
+            turn = about(DOWN, sign * np.radians(7.0) * self._wander(times, 8.3, channel + 3))
             for part, what in (("shoulder", swing), ("elbow", bend), ("wrist", turn)):
                 row = INDEX[f"{side}_{part}"]
                 pose[..., row, :] = multiply(what, pose[..., row, :])

@@ -1,6 +1,7 @@
 """The file with which a page moves a person: the person's figure and gestures."""
 
 import json
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +13,7 @@ from ico3d.motion.clip import Clip, from_bytes, header_of, meaning, other_hand, 
 from ico3d.motion.figure import NEAR, alike, figure_of
 from ico3d.motion.living import Living, living
 from ico3d.motion.roles import ROLES
+from ico3d.motion.standing import APART, APART_BEFORE, stance_of
 from ico3d.rig.quaternions import Array
 from ico3d.rig.rig import Rig
 
@@ -27,7 +29,7 @@ def preferring(recorded: dict[str, Clip], others: dict[str, Clip]) -> dict[str, 
     """
     meant = {meaning(name) for name in recorded}
     meant |= {other_hand(name) for name in meant}
-    return recorded | {name: clip for name, clip in others.items() if name not in meant}
+    return recorded | {name: clip for name, clip in others.items() if meaning(name) not in meant}
 
 
 def repertoire_bytes(somebody: Living, clips: dict[str, Clip], cuts: str = "") -> bytes:
@@ -53,7 +55,10 @@ def clips_for(content: bytes, rig: Rig) -> dict[str, Clip]:
         SettingsError: If the file is damaged, or its figure is not that of the rig.
     """
     clips = from_bytes(content)  # raises for a damaged file; the figure is checked below
-    if not alike(figure_of(living(rig, 0, hung_of(content))), _figure(content)):
+    somebody = living(rig, 0, hung_of(content))
+    stances = (stance_of(somebody.person, apart) for apart in (APART, APART_BEFORE))
+    figures = (figure_of(replace(somebody, stance=stance)) for stance in stances)
+    if not any(alike(figure, _figure(content)) for figure in figures):
         raise SettingsError("the file of gestures was made for another rig.")
     return clips
 

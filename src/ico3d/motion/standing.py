@@ -10,8 +10,9 @@ from ico3d.motion.roles import INDEX, SIDES
 from ico3d.motion.turning import across, aligned, unit
 from ico3d.rig.quaternions import Array, conjugate, multiply, rotate
 
-APART = 1.3
-"""Largest distance between the ankles of a standing person, relative to that between the hips."""
+APART, APART_BEFORE = 0.95, 1.3
+"""Largest distance between the ankles of a standing person, relative to that between the hips, and
+what it was in files of earlier versions."""
 SOFT = 0.995
 """Distance from hip to ankle of a standing person, relative to the leg's length; knees are soft."""
 KNEE = 0.03
@@ -89,15 +90,20 @@ def _at_rest(person: Person, limb: tuple[str, str, str]) -> Bend:
     return Bend(upper, lower, across(hinge, unit(ankle - hip)))
 
 
-def stance_of(person: Person) -> Stance:
-    """A stance with feet at their rest positions, moved together if they are too far apart."""
+def stance_of(person: Person, apart: float = APART) -> Stance:
+    """A stance with feet at their rest positions, moved together if they are too far apart.
+
+    Args:
+        person: Who stands.
+        apart: Largest distance between the ankles, relative to that between the hips.
+    """
     hips = {side: person.place(f"{side}_hip") for side in SIDES}
     ankles: dict[str, Array] = {side: person.place(f"{side}_ankle").copy() for side in SIDES}
-    width = APART * abs(hips["left"][0] - hips["right"][0])
-    apart = abs(ankles["left"][0] - ankles["right"][0])
+    width = apart * abs(hips["left"][0] - hips["right"][0])
+    at_rest = abs(ankles["left"][0] - ankles["right"][0])
     middle = (ankles["left"][0] + ankles["right"][0]) / 2
     for side in SIDES:
-        ankles[side][0] = middle + min(1.0, width / apart) * (ankles[side][0] - middle)
+        ankles[side][0] = middle + min(1.0, width / at_rest) * (ankles[side][0] - middle)
     sinks: list[float] = []
     for side in SIDES:
         limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")

@@ -8,8 +8,8 @@ import { about } from './turning.ts';
 const RADIANS = Math.PI / 180;
 const BREATH = 4.1; // duration of a breath, s
 const WEIGHT = 9.7; // period of the quickest of the sines that shift the weight, s
-const SHIFT = 0.015; // displacement of the hips to each side, relative to the person's height
-const DROP = 0.0055; // how far the hips sink with the weight on one leg, relative to height
+const SHIFT = 0.02; // displacement of the hips to each side, relative to the person's height
+const DROP = 0.0075; // how far the hips sink with the weight on one leg, relative to height
 const SWAY = 0.003; // displacement of the hips forwards and back, relative to height
 /** Angles by which a breath turns chest, head and collarbones. */
 const BREATHING = { chest: -1.1 * RADIANS, head: 0.9 * RADIANS, clavicles: 1.0 * RADIANS };
@@ -67,7 +67,7 @@ export class Living {
   }
 
   private turnTorso(time: number, breath: number, weight: number, pose: Quat[]): void {
-    const roll = 3.4 * RADIANS * weight;
+    const roll = 5.0 * RADIANS * weight;
     const head = this.about([BREATHING.head * breath, 0, 0.4 * roll], time, 5.9, 16, [1.3, 2.2, 1.0]);
     const turns: [Role, Vector][] = [
       ['hips', this.about([0, 0, roll], time, 12.7, 10, [0.5, 1.2, 0.2])],
@@ -87,9 +87,9 @@ export class Living {
       pose[indexOf(`${side}_clavicle`)] = about(FORWARD!, sign * BREATHING.clavicles * (0.5 + 0.5 * breath));
       const away = about(FORWARD!, sign * 1.2 * RADIANS * (0.5 + 0.5 * wave(9.1, 1)));
       const turns: [Role, Quat][] = [
-        [`${side}_shoulder`, multiply(away, about(LEFTWARDS!, 1.5 * RADIANS * wave(7.3, 0)))],
-        [`${side}_elbow`, about(HINGE!, 2.5 * RADIANS * wave(6.1, 2))],
-        [`${side}_wrist`, about(DOWN!, sign * 4.0 * RADIANS * wave(8.3, 3))],
+        [`${side}_shoulder`, multiply(away, about(LEFTWARDS!, 2.5 * RADIANS * wave(7.3, 0)))],
+        [`${side}_elbow`, about(HINGE!, 5.0 * RADIANS * wave(6.1, 2))],
+        [`${side}_wrist`, about(DOWN!, sign * 7.0 * RADIANS * wave(8.3, 3))],
       ];
       for (const [role, turn] of turns) pose[indexOf(role)] = multiply(turn, pose[indexOf(role)]!);
     }

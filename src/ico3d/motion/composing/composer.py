@@ -46,9 +46,9 @@ PAUSE = 0.2
 ROUNDS = 2
 """Number of times that the hold of a gesture is repeated at least, if it is a motion."""
 BEATS = (
-    (0.50, "beat_right", False),
-    (0.14, "beat_right", True),
-    (0.18, "beat_both", False),
+    (0.48, "beat_right", False),
+    (0.20, "beat_right", True),
+    (0.14, "beat_both", False),
     (0.10, "open_hand", False),
     (0.08, "open_hands", False),
 )

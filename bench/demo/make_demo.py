@@ -1,6 +1,6 @@
 """Builds the demo avatar that comes in the package, from a subject file to the bundle.
 
-    python bench/make_demo.py human_face_f.npz --licences ICT-FaceKit-LICENSE.txt --work WORK
+    python bench/demo/make_demo.py human_face_f.npz --licences ICT-FaceKit-LICENSE.txt --work WORK
 
 The same command goes on where it was stopped, at the next picture or from the latest checkpoint;
 what WORK holds already is not made again, and the seed decides everything. Head and body are
@@ -13,27 +13,19 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tyro
+from finishing import write_finished
 
-from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.embodying.builds.change import change_to
-from ico3d.avatar.render_bundle import BakedAvatar
-from ico3d.avatar.staging import thumbnail
-from ico3d.bundle.animation import ANIMATION, Rest
-from ico3d.bundle.format import THUMBNAIL, Bundle, coarse_first, write_bundle
-from ico3d.bundle.head import HEAD as HEAD_FILE
-from ico3d.bundle.head import HEAD_REST, BakedHead
-from ico3d.bundle.manifest import Manifest
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.head import HEAD_REST
 from ico3d.bundle.packaged import FILE
-from ico3d.bundle.skinned.baked import BakedSkinned
-from ico3d.bundle.skinned.gestures import gesture_files
-from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
-from ico3d.bundle.skinned.lamp import POINT_UNIT
+from ico3d.bundle.skinned.info import SKINNED_REST
 from ico3d.cli import run_script
 from ico3d.common.files import write_atomic
 from ico3d.motion.recorded.cut import CUTS, to_toml
@@ -51,20 +43,11 @@ GESTURES = ("wave", "point", "open_hands", "shrug", "count_three", "nod", "shake
 """To look at: hands, armpits and neck in poses that nobody recorded."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 MAKER = "the authors of ico3d"
-RESTS = Rest(16, 17)
-"""Frames of the body's recording in which she nods a little, with hanging arms."""
 LIGHT = "soft"
 """What an arm shades in the recording stays dark in every pose: its shade should be faint."""
 SLENDER = 0.8
 """How far the subject's body is on the way to MakeHuman's slender build: the files' shoulders and
 sleeves are broad for their heads."""
-SHOULDERS, ARM = 0.02, "shoulder01"
-"""Metres by which each arm is moved inwards once she is baked, since builds leave the skeleton as
-it is, and the joints that begin an arm."""
-BARE = ("wrist", "lowerarm02", "metacarpal", "finger", "neck", "spine01")
-REDDEST = (0.9, 1.4)
-"""Joints that carry bare skin, and by how much the logit of its red exceeds those of green and blue
-at most: that of nineteen in twenty of the hands' Gaussians. Wool is blue and has none."""
 TRIED = 2
 """Cameras whose pictures are timed before recording."""
 
@@ -208,94 +191,6 @@ def slenderer(person: dict[str, np.ndarray], share: float) -> dict[str, np.ndarr
     rig = Rig(tuple(map(str, names)), tuple(map(int, parents)), places)
     moves, _ = change_to("slender", rig).at(person["verts"].astype(np.float64))
     return person | {"verts": (person["verts"] + share * moves).astype(np.float32)}
-
-
-def write_finished(path: Path) -> None:
-    """Moves the arms of a bundle's body inwards, with its gestures, and takes red from its skin."""
-    bundle = Bundle.open(path)
-    assert bundle.skinned is not None
-    body = muted(narrower(bundle.skinned))
-    head, gestures = bundle.require_head()[0], gesture_files(body, (), 1.0)
-    write_person(path, bundle, bundle.manifest, head, body, gestures)
-
-
-def write_person(
-    path: Path,
-    bundle: Bundle,
-    manifest: Manifest,
-    head: BakedHead,
-    body: BakedSkinned,
-    more: dict[str, bytes],
-) -> None:
-    """Writes a person's bundle anew, with this head and body, and a thumbnail of her at rest.
-
-    She rests where her arms hang: a rule would have her rest where hands are still for longest, at
-    her chin.
-
-    Args:
-        path: The file to write.
-        bundle: All that stays as it is.
-        manifest: Its manifest, with what `head` changes there.
-        head: Takes the place of the bundle's.
-        body: Takes the place of the bundle's.
-        more: Further files, by name.
-    """
-    assert manifest.head is not None
-    assert bundle.animation is not None  # its body moves
-    old = (HEAD_REST, SKINNED_REST)
-    files = {name: bundle.read(name) for name in bundle.manifest.files if name not in old}
-    files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()} | more
-    person = BakedAvatar(head, SkinnedBody(body), bundle.require_head()[1])
-    files[ANIMATION] = replace(bundle.animation, rest=RESTS).to_bytes()
-    seconds = RESTS.end / bundle.animation.fps
-    resting = person.gaussians(seconds, manifest.head.idle_expression)
-    files[THUMBNAIL] = thumbnail(resting, manifest.camera, manifest.background)
-    info = replace(manifest.head, num_rest=0)
-    manifest = replace(manifest, head=info, skinned=replace(body.info, num_rest=0))
-    write_bundle(path, *coarse_first(manifest, files))
-
-
-def narrower(body: BakedSkinned) -> BakedSkinned:
-    """The body with its arms `SHOULDERS` nearer to the middle; what hangs on both goes part way."""
-    rig, lamp = body.rig, body.lamp
-    assert lamp is not None  # it is recorded in the light of one
-    moves = np.zeros((len(rig), 3))
-    for joint, parent in enumerate(rig.parents):
-        if rig.names[joint].startswith(ARM):
-            moves[joint, 0] = -SHOULDERS * np.sign(rig.joints[joint, 0])
-        elif parent >= 0:
-            moves[joint] = moves[parent]
-    points = lamp.caster_points * POINT_UNIT + _carried(
-        moves, lamp.caster_joints, lamp.caster_weights
-    )
-    casters = np.rint(points / POINT_UNIT).astype(np.int16)
-    return replace(
-        body,
-        means=(body.means + _carried(moves, body.joints, body.weights)).astype(np.float32),
-        rig_joints=(body.rig_joints + moves).astype(np.float32),
-        lamp=replace(lamp, caster_points=casters),
-    )
-
-
-def muted(body: BakedSkinned) -> BakedSkinned:
-    """The body whose hands, wrists and neck are nowhere redder than `REDDEST`.
-
-    Few pictures show skin in the shade of cuffs and collar, and what they show is red with the
-    light that went through skin: seen from elsewhere it was a glowing ring.
-    """
-    strongest = body.joints[np.arange(len(body.joints)), body.weights.argmax(1)]
-    bare = np.array([name.startswith(BARE) for name in body.rig.names])[strongest]  # (N,)
-    logits = body.color_logits.astype(np.float64)
-    excess = np.maximum(logits[:, :1] - logits[:, 1:] - REDDEST, 0) * bare[:, None]  # (N, 2)
-    logits[:, 1:] += 0.7 * excess
-    logits[:, 0] -= 0.3 * excess.max(1)
-    return replace(body, color_logits=logits.astype(np.float16))
-
-
-def _carried(moves: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(N, 3) how far points go that hang on joints (N, 4) which move (J, 3)."""
-    share = weights / weights.sum(1, keepdims=True)  # (N, 4)
-    return np.einsum("nk,nkd->nd", share, moves[joints])
 
 
 def _seconds_of_a_picture(subject: Path, rig: str, shot: Shot) -> float:
