@@ -1,5 +1,6 @@
 """Pictures that are kept, read again, or read in advance."""
 
+import shutil
 import threading
 import time
 
@@ -10,6 +11,7 @@ from ico3d.capture.pictures import View
 from ico3d.capture.reading import memory
 from ico3d.capture.reading.layer_cache import AHEAD, QUEUED, LayerCache, read_in_turn
 from ico3d.common.camera import Camera
+from ico3d.common.files import SPARE
 from ico3d.errors import CaptureError, SettingsError
 from support.full_disk import files_of_at_most
 
@@ -118,6 +120,18 @@ def test_a_full_disk_of_the_cache_is_no_end(tmp_path, caplog):
         for _ in range(2):
             assert [cache.layers(0, f)[0][0, 0, 0] for f in (1, 2, 3)] == [1, 2, 3]
     assert [r.message for r in caplog.records].count(caplog.records[0].message) == 1
+    assert "The disk of --cache-dir is full" in caplog.text
+
+
+def test_the_cache_leaves_room_on_its_disk(tmp_path, caplog, monkeypatch):
+    reader = Reader()
+    cache = LayerCache(reader, 0.0, str(tmp_path))
+    left = [SPARE + 12, SPARE + 11]  # the second picture of 12 bytes does not fit any more
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=left.pop(0)))
+    for _ in range(2):
+        assert [cache.layers(0, f)[0][0, 0, 0] for f in (1, 2, 3)] == [1, 2, 3]
+    assert reader.read == [(0, 1), (0, 2), (0, 3), (0, 2), (0, 3)]
     assert "The disk of --cache-dir is full" in caplog.text
 
 

@@ -13,6 +13,7 @@ from starlette.testclient import TestClient
 
 from ico3d.chat.serving.sites import Sites
 from ico3d.cli import main
+from ico3d.common.files import full_disk
 from ico3d.creating.settings import QUALITIES
 from ico3d.recording import app as server
 from ico3d.recording.guiding import looking
@@ -284,9 +285,15 @@ def test_a_full_disk_is_one_sentence(page, monkeypatch, video):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Person, "append", full)
-    answer = _send(page, "left", video)
-    assert (answer.status_code, answer.json()["code"]) == (507, "full")
+    def full_too(*_):
+        with full_disk(Path("/a/secret/path")):
+            full()
+
+    for fails in (full, full_too):
+        monkeypatch.setattr(Person, "append", fails)
+        answer = _send(page, "left", video)
+        assert (answer.status_code, answer.json()["code"]) == (507, "full")
+        assert "secret" not in answer.text
 
 
 def test_without_a_tracker_the_page_is_told(page):

@@ -28,6 +28,9 @@ MOST_BYTES = 4 << 30
 LONGEST = 3_500
 """Characters of a path below which `walk` looks: systems end at 4,096 bytes, names of files too."""
 
+SPARE = 1 << 28
+"""Bytes of a disk that stay free where it is not known before how much is going to be written."""
+
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a system says when a disk, a quota or the limit of a file's size is reached."""
 

@@ -20,7 +20,7 @@ from ico3d.common.files import FULL
 from ico3d.common.typed import loose_json, plain
 from ico3d.creating.settings import QUALITIES
 from ico3d.creating.voice.clone import hindrance
-from ico3d.errors import Ico3dError
+from ico3d.errors import Ico3dError, StorageError
 from ico3d.recording.guiding.coverage import covered
 from ico3d.recording.guiding.fair_queue import FairQueue
 from ico3d.recording.guiding.guide import Told
@@ -129,10 +129,10 @@ async def _refuse(request: Request, error: Exception) -> Response:
     del request
     if isinstance(error, FileNotFoundError):  # somebody deleted it meanwhile
         error = Refused("part", "this is not there any more.", 404)
-    elif isinstance(error, OSError):
-        if error.errno not in FULL:
-            raise error
+    elif isinstance(error, StorageError) or getattr(error, "errno", None) in FULL:
         error = full_disk()
+    elif isinstance(error, OSError):
+        raise error
     told = error if isinstance(error, Refused) else Refused("", str(error), 500)
     shown = {"code": told.code, "error": str(told), "advice": [plain(one) for one in told.advice]}
     return JSONResponse(shown, told.status, NEVER_KEPT)

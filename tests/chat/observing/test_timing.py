@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+from loguru import logger
 from pipecat.frames.frames import (
     BotStartedSpeakingFrame,
     BotStoppedSpeakingFrame,
@@ -29,6 +30,7 @@ from ico3d.chat.observing.timing import PARTS, TurnObserver
 from ico3d.chat.wire.protocol import Metrics
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.scripted import Script, Voice
+from support.full_disk import files_of_at_most
 
 
 class Watched:
@@ -232,3 +234,15 @@ async def test_turns_become_figures_and_lines(watched, tmp_path):
 def test_a_log_that_cannot_be_written_is_one_sentence(tmp_path):
     with pytest.raises(SettingsError, match=r"--log .* cannot be written"):
         TurnLog.open(tmp_path)
+
+
+def test_a_log_on_a_full_disk_ends_no_session_and_goes_on_later(tmp_path):
+    log, warnings_told = TurnLog.open(tmp_path / "turns.jsonl"), []
+    number = logger.add(warnings_told.append, level="WARNING", format="{message}")
+    with files_of_at_most(40):
+        for turn in range(3):
+            log.write({"turn": turn, "padding": "x" * 30})
+    log.write({"turn": 3})
+    logger.remove(number)
+    assert '{"turn": 3}' in (tmp_path / "turns.jsonl").read_text()
+    assert sum("--log cannot be written" in told for told in warnings_told) == 1

@@ -21,8 +21,8 @@ export function brief(text: string): string {
 }
 
 // marks, joiners, tags and skin tones: what does not begin a letter of its own; as many as writing knows, and more of them
-const MORE = String.raw`\p{M}\p{Cf}\p{Emoji_Modifier}\u0e33\u0eb3\uff9e\uff9f`;
-const CONTINUED = new RegExp(`([${MORE}]{16})[${MORE}]+`, 'gu');
-// of scripts that put blanks between words; others break where they like
-const WORD = String.raw`[^\s\u200b\p{sc=Han}\p{sc=Hira}\p{sc=Kana}\p{sc=Thai}\p{sc=Laoo}\p{sc=Khmr}\p{sc=Mymr}\u3000-\u303f\uff00-\uffef]`;
-const LONG_WORD = new RegExp(`${WORD}{100,116}?(?=(?![${MORE}])${WORD})`, 'gu');
+const MORE = String.raw`[\p{M}\p{Cf}\p{Emoji_Modifier}\u0e33\u0eb3\uff9e\uff9f]`;
+const CONTINUED = new RegExp(`(${MORE}{16})${MORE}+`, 'gu');
+// a letter of scripts that put blanks between words; others break where they like, but not before what belongs to a letter
+const LETTER = String.raw`(?!${MORE})[^\s\u200b\p{sc=Han}\p{sc=Hira}\p{sc=Kana}\p{sc=Thai}\p{sc=Laoo}\p{sc=Khmr}\p{sc=Mymr}\u3000-\u303f\uff00-\uffef]`;
+const LONG_WORD = new RegExp(`(?:(?!\\u200b)${MORE}|${LETTER}){100,116}?(?=${LETTER})`, 'gu');

@@ -26,6 +26,14 @@ describe('marks on a letter', () => {
     for (const text of [address, '漢'.repeat(500), 'かな、カナ'.repeat(100), 'ไม่เป็นไร'.repeat(40)]) expect(calm(text)).toBe(text);
   });
 
+  test.each(['\u302a', '\u3099', '\uff9e', '\u0e34', '\u1036', '\u17b7'])('also with marks of such scripts in them: %j', (mark) => {
+    const word = `${'\u07da\u20dd'.repeat(40)}${mark}`.repeat(40);
+    const broken = calm(word);
+    expect(broken.replaceAll('\u200b', '')).toBe(word);
+    expect(Math.max(...broken.split('\u200b').map((part) => part.length))).toBeLessThanOrEqual(117);
+    expect(broken).not.toMatch(/\u200b\p{M}/u);
+  });
+
   test('a text is no longer than is laid out at once, and one within an error is short', () => {
     expect(calm('漢'.repeat(16_000))).toBe(`${'漢'.repeat(4000)}…`);
     expect(brief('a short one')).toBe('a short one');

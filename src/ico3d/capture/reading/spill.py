@@ -2,6 +2,7 @@
 
 import logging
 import os
+import shutil
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from threading import Lock
 
 import numpy as np
 
-from ico3d.common.files import FULL
+from ico3d.common.files import FULL, SPARE
 from ico3d.errors import SettingsError
 
 log = logging.getLogger(__name__)
@@ -37,6 +38,8 @@ class Spill:
     def __init__(self, folder: Path):
         """Makes the file.
 
+        It grows while `SPARE` bytes of the disk stay free: other files are written there as well.
+
         Args:
             folder: A folder on a disk with room; made where missing.
 
@@ -50,12 +53,14 @@ class Spill:
             raise SettingsError(
                 f"--cache-dir {folder} cannot be written to ({error.strerror}): choose another."
             ) from error
-        self._end, self._turn, self._full = 0, Lock(), False
+        self._folder, self._end, self._turn, self._full = folder, 0, Lock(), False
 
     def write(self, layers: Layers) -> Stored | None:
         """Stores layers; None once the disk is full, which is said once."""
         size = size_of(layers)
         with self._turn:
+            if not self._full and shutil.disk_usage(self._folder).free < size + SPARE:
+                self._fill()
             if self._full:
                 return None
             begin, self._end = self._end, self._end + size
@@ -66,12 +71,13 @@ class Spill:
         except OSError as error:
             if error.errno not in FULL:
                 raise
-            self._full = True
-            log.warning(
-                "The disk of --cache-dir is full: further pictures are decoded at each use."
-            )
+            self._fill()
             return None
         return Stored(begin, tuple(None if layer is None else layer.shape for layer in layers))
+
+    def _fill(self) -> None:
+        self._full = True
+        log.warning("The disk of --cache-dir is full: further pictures are decoded at each use.")
 
     def read(self, stored: Stored) -> Layers:
         """The layers that were stored."""

@@ -10,12 +10,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import SPARE, write_atomic
 from ico3d.common.people.stated import NOT_STATED
 from ico3d.errors import CaptureError, StorageError
 
-SPARE = 1 << 28
-"""Bytes of a disk that a folder of a recording leaves free."""
 UNFINISHED = "unfinished.json"
 """File of an unfinished folder that says of whom it is, from the first picture on."""
 _HIDDEN = re.compile(r"\..+\.[0-9a-f]{8}", re.DOTALL)

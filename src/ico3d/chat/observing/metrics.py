@@ -34,7 +34,7 @@ class TurnLog:
 
     def __init__(self, file: TextIO):
         """Takes an open file; use `TurnLog.open`."""
-        self._file = file
+        self._file, self._fails = file, False
 
     @classmethod
     def open(cls, path: Path) -> "TurnLog":
@@ -49,8 +49,14 @@ class TurnLog:
             raise SettingsError(f"--log {path}: cannot be written ({error.strerror}).") from error
 
     def write(self, entry: dict) -> None:
-        """Appends a line."""
-        self._file.write(json.dumps(entry) + "\n")
+        """Appends a line; where that fails, as on a full disk, it is said once."""
+        try:
+            self._file.write(json.dumps(entry) + "\n")
+            self._fails = False
+        except OSError as error:
+            if not self._fails:
+                logger.warning(f"--log cannot be written ({error.strerror}).")
+            self._fails = True
 
 
 class Monitor:
