@@ -5,7 +5,7 @@
 The person is drawn by the studio at the stroke of each gesture, in the pose that the first bundle
 would take, and so is the body of each bundle. PSNR is over what is seen of the person but the face,
 whose expression is another one. For bundles of which nobody has moved the skeleton since the
-recording: of `bench/demo/make_demo.py` those before `write_finished`.
+recording: of `bench/make_demo.py` those before `write_finished`.
 """
 
 import sys

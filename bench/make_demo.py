@@ -1,6 +1,6 @@
 """Builds the demo avatar that comes in the package, from a subject file to the bundle.
 
-    python bench/demo/make_demo.py human_face_f.npz --licences ICT-FaceKit-LICENSE.txt --work WORK
+    python bench/make_demo.py human_face_f.npz --licences ICT-FaceKit-LICENSE.txt --work WORK
 
 The same command goes on where it was stopped, at the next picture or from the latest checkpoint;
 what WORK holds already is not made again, and the seed decides everything. Head and body are
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import tyro
-from finishing import write_finished
+from demo.finishing import write_finished
 
 from ico3d.avatar.embodying.builds.change import change_to
 from ico3d.bundle.format import Bundle

@@ -1,6 +1,6 @@
 """Puts a head that was trained anew in place of a bundle's, on the body that it had.
 
-    python bench/demo/renew_head.py old.ico3d HEAD HEAD_CAPTURE BODY_CAPTURE new.ico3d
+    python bench/renew_head.py old.ico3d HEAD HEAD_CAPTURE BODY_CAPTURE new.ico3d
 
 For the same person in the same light, as `make_demo.py` records them: the body was trained beside
 the old head, and its Gaussians stay bit for bit what they are. BODY_CAPTURE says where the face is
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from finishing import write_person
+from demo.finishing import write_person
 from make_demo import check
 
 from ico3d.avatar.baking import head_bundle
