@@ -105,10 +105,10 @@ class Living:
             channel = 20 + 10 * number
             lifted = about(forward, sign * _BREATHING[2] * (0.5 + 0.5 * breath))
             pose[..., INDEX[f"{side}_clavicle"], :] = lifted
-            swing = about(sidewards, np.radians(2.5) * self._wander(times, 7.3, channel))
+            swing = about(sidewards, np.radians(1.5) * self._wander(times, 7.3, channel))
             away = 0.5 + 0.5 * self._wander(times, 9.1, channel + 1)
             swing = multiply(about(forward, sign * np.radians(1.2) * away), swing)
-            bend = about(HINGE, np.radians(5.0) * self._wander(times, 6.1, channel + 2))
+            bend = about(HINGE, np.radians(3.0) * self._wander(times, 6.1, channel + 2))
             turn = about(DOWN, sign * np.radians(7.0) * self._wander(times, 8.3, channel + 3))
             for part, what in (("shoulder", swing), ("elbow", bend), ("wrist", turn)):
                 row = INDEX[f"{side}_{part}"]

@@ -87,8 +87,8 @@ export class Living {
       pose[indexOf(`${side}_clavicle`)] = about(FORWARD!, sign * BREATHING.clavicles * (0.5 + 0.5 * breath));
       const away = about(FORWARD!, sign * 1.2 * RADIANS * (0.5 + 0.5 * wave(9.1, 1)));
       const turns: [Role, Quat][] = [
-        [`${side}_shoulder`, multiply(away, about(LEFTWARDS!, 2.5 * RADIANS * wave(7.3, 0)))],
-        [`${side}_elbow`, about(HINGE!, 5.0 * RADIANS * wave(6.1, 2))],
+        [`${side}_shoulder`, multiply(away, about(LEFTWARDS!, 1.5 * RADIANS * wave(7.3, 0)))],
+        [`${side}_elbow`, about(HINGE!, 3.0 * RADIANS * wave(6.1, 2))],
         [`${side}_wrist`, about(DOWN!, sign * 7.0 * RADIANS * wave(8.3, 3))],
       ];
       for (const [role, turn] of turns) pose[indexOf(role)] = multiply(turn, pose[indexOf(role)]!);

@@ -87,9 +87,9 @@ def _both(
 _ELBOW = (0.5, -0.82, -0.3)
 
 # The elbow is beside the trunk, under the hand: an arm that points at who looks has no bones.
-_WAVE = Reach((0.20, 0.12, 0.34), (0.5, -0.85, -0.35), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
-_WAVE_IN = replace(_WAVE, place=(0.17, 0.11, 0.34), fingers=(-0.34, 1.0, 0.06))
-_WAVE_OUT = replace(_WAVE, place=(0.23, 0.11, 0.34), fingers=(0.36, 1.0, 0.06))
+_WAVE = Reach((0.11, 0.13, 0.34), (0.42, -0.9, -0.4), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
+_WAVE_IN = replace(_WAVE, place=(0.09, 0.12, 0.34), fingers=(-0.34, 1.0, 0.06))
+_WAVE_OUT = replace(_WAVE, place=(0.13, 0.12, 0.34), fingers=(0.36, 1.0, 0.06))
 
 _AIM = Reach((0.14, -0.34, 0.40), (0.55, -0.82, -0.3), (-0.1, 0.25, 1.0), (-0.8, -0.6, 0.1))
 _POINT = Reach((-0.03, -0.10, 0.83), _ELBOW, (-0.06, 0.06, 1.0), (-0.55, -0.83, 0.0), "point")
