@@ -1,6 +1,5 @@
 """Pictures that are kept, read again, or read in advance."""
 
-import shutil
 import threading
 import time
 
@@ -10,6 +9,7 @@ import pytest
 from ico3d.capture.pictures import View
 from ico3d.capture.reading import memory
 from ico3d.capture.reading.layer_cache import AHEAD, QUEUED, LayerCache, read_in_turn
+from ico3d.capture.reading.spill import Spill
 from ico3d.common.camera import Camera
 from ico3d.common.files import SPARE
 from ico3d.errors import CaptureError, SettingsError
@@ -127,8 +127,7 @@ def test_the_cache_leaves_room_on_its_disk(tmp_path, caplog, monkeypatch):
     reader = Reader()
     cache = LayerCache(reader, 0.0, str(tmp_path))
     left = [SPARE + 12, SPARE + 11]  # the second picture of 12 bytes does not fit any more
-    usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=left.pop(0)))
+    monkeypatch.setattr(Spill, "_free", lambda _: left.pop(0))
     for _ in range(2):
         assert [cache.layers(0, f)[0][0, 0, 0] for f in (1, 2, 3)] == [1, 2, 3]
     assert reader.read == [(0, 1), (0, 2), (0, 3), (0, 2), (0, 3)]

@@ -2,7 +2,6 @@
 
 import logging
 import os
-import shutil
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,13 +52,13 @@ class Spill:
             raise SettingsError(
                 f"--cache-dir {folder} cannot be written to ({error.strerror}): choose another."
             ) from error
-        self._folder, self._end, self._turn, self._full = folder, 0, Lock(), False
+        self._end, self._turn, self._full = 0, Lock(), False
 
     def write(self, layers: Layers) -> Stored | None:
         """Stores layers; None once the disk is full, which is said once."""
         size = size_of(layers)
         with self._turn:
-            if not self._full and shutil.disk_usage(self._folder).free < size + SPARE:
+            if not self._full and self._free() < size + SPARE:
                 self._fill()
             if self._full:
                 return None
@@ -74,6 +73,11 @@ class Spill:
             self._fill()
             return None
         return Stored(begin, tuple(None if layer is None else layer.shape for layer in layers))
+
+    def _free(self) -> int:
+        """Bytes that are left on the disk."""
+        disk = os.fstatvfs(self._file.fileno())  # its folder may be gone
+        return disk.f_bavail * disk.f_frsize
 
     def _fill(self) -> None:
         self._full = True
