@@ -113,7 +113,7 @@ class Serve:
             warm_up(parts)
         app = server.make_app(bundle, avatar, self.host, sessions, sites, reach.answered)
         url = server.address(listener, reach.scheme)
-        listener.listen()  # whoever reads the address and comes at once is served in a moment
+        server.listen(listener)
         name = (persona or bundle.manifest.persona).name
         print(f"{printable(name)} is at {url}{fragment(key)} (Ctrl+C ends)")
         print("\n".join(reach.told(listener.getsockname()[1], key)))

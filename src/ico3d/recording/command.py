@@ -97,7 +97,7 @@ class Studio:
             raise SettingsError(f"{self.folder} cannot be written ({error.strerror}).") from error
         app = make_app(room, self.host, sites, reach.answered)
         url = server.address(listener, reach.scheme)
-        listener.listen()
+        server.listen(listener)
         print(f"The studio is at {url}{fragment(key)} (Ctrl+C ends)", flush=True)
         print("\n".join(reach.told(listener.getsockname()[1], key)))
         print(printable(f"Recordings and avatars are in {self.folder}"))

@@ -21,7 +21,7 @@ from ico3d.bundle.persona import Persona
 from ico3d.chat.performing.face import open_face
 from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import is_own
-from ico3d.chat.serving.server import bind, make_server
+from ico3d.chat.serving.server import bind, listen, make_server
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
@@ -334,3 +334,12 @@ async def test_who_leaves_while_an_echo_is_sent_is_no_fault():
             raise WebSocketDisconnect(1006)
 
     await echo(Left())
+
+
+def test_the_later_of_two_that_open_a_port_at_once_says_that_it_is_taken():
+    with closing(bind("127.0.0.1", 0)) as first:
+        port = first.getsockname()[1]
+        with closing(bind("127.0.0.1", port)) as second:  # the first does not listen yet
+            listen(first)
+            with pytest.raises(SettingsError, match=f"port {port} on 127.0.0.1 cannot be used"):
+                listen(second)

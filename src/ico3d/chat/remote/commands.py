@@ -57,6 +57,7 @@ class ServeModule:
         listener = server.bind(self.host, self.port)
         name, app = self._app(key)
         url = server.address(listener)
+        server.listen(listener)
         print(f"{self.kind} with {name} is at {url}v1 (Ctrl+C ends)")
         if self.host not in LOOPBACK and not key:
             print("Anybody who reaches this address may use it: set --key-variable.")

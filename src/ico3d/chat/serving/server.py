@@ -165,11 +165,29 @@ def bind(host: str, port: int) -> socket.socket:
         listener.bind((host, port))
     except OSError as error:
         listener.close()
-        raise SettingsError(
-            f"port {port} on {host} cannot be used ({error.strerror}): "
-            "choose another one with --port (make demo: PORT=...), 0 takes any."
-        ) from error
+        raise _taken(host, port, error) from error
     return listener
+
+
+def listen(listener: socket.socket) -> None:
+    """Takes connections from now on: whoever reads the address and comes at once is served soon.
+
+    Raises:
+        SettingsError: If another server began to listen on the port since it was opened.
+    """
+    host, port = listener.getsockname()[:2]
+    try:
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        raise _taken(host, port, error) from error
+
+
+def _taken(host: str, port: int, error: OSError) -> SettingsError:
+    return SettingsError(
+        f"port {port} on {host} cannot be used ({error.strerror}): "
+        "choose another one with --port (make demo: PORT=...), 0 takes any."
+    )
 
 
 def address(listener: socket.socket, scheme: str = "http") -> str:
