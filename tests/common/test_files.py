@@ -1,6 +1,7 @@
 """Files are whole or not there."""
 
 import os
+import shutil
 import tracemalloc
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 from ico3d.common import files
 from ico3d.common.files import (
+    SPARE,
     holds,
     json_of,
     read_object,
@@ -15,7 +17,9 @@ from ico3d.common.files import (
     remove_unfinished,
     walk,
     write_atomic,
+    write_one_of_many,
 )
+from ico3d.errors import StorageError
 
 
 def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -104,3 +108,13 @@ def test_what_is_no_json_is_told_as_such(tmp_path, content):
     assert read_object(file) == {}
     file.write_bytes(b'\xef\xbb\xbf{"a": [1, NaN]}')  # as some editors begin a file
     assert json_of(file)["a"][0] == 1
+
+
+def test_one_of_many_files_leaves_room_on_the_disk(tmp_path, monkeypatch):
+    path, left = tmp_path / "new" / "000001.png", [SPARE, SPARE - 1]
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=left.pop(0)))
+    write_one_of_many(path, b"1")
+    with pytest.raises(StorageError, match="000001.png cannot be written, as the disk is full"):
+        write_one_of_many(path, b"2")
+    assert path.read_bytes() == b"1"

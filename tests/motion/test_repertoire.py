@@ -9,6 +9,8 @@ from safetensors.numpy import load, save
 
 from ico3d.errors import SettingsError
 from ico3d.motion.clip import Clip, Marks, to_bytes
+from ico3d.motion.composing.cues import Cue, Release
+from ico3d.motion.composing.performer import Performer
 from ico3d.motion.curves import Curve
 from ico3d.motion.figure import alike, figure_of
 from ico3d.motion.living import living
@@ -126,3 +128,11 @@ def test_a_recorded_gesture_replaces_all_takes_of_the_package():
     nod = CLIPS["nod"]
     others = {"nod": nod, "nod_2": nod, "beat_left": nod, "beat_left_2": nod, "wave": nod}
     assert set(preferring({"nod": nod, "beat_right": nod}, others)) == {"nod", "beat_right", "wave"}
+
+
+def test_a_stranger_s_gesture_that_moves_nothing_is_shown_as_nothing(rig):
+    still = Clip("nod", Marks(0.1, 0.2, 0.2, 0.2, 0.5), {})
+    somebody = living(rig, 3)
+    performer = Performer(somebody, {"nod": still})
+    performer.follow([Cue(0, "nod", True, 0.0, 0.2), Release(0, 0.3)])
+    np.testing.assert_allclose(performer.at(0.2)[0][0], somebody.at(0.2)[0], atol=1e-12)

@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import secrets
+import shutil
 import stat
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
@@ -67,6 +68,20 @@ def write_atomic(
             _sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_one_of_many(path: Path, write: Callable[[Path], None] | bytes) -> None:
+    """Writes a file as `write_atomic`, of as many as a stranger's recording may ask for.
+
+    Raises:
+        StorageError: If less than `SPARE` bytes of the disk are left, or it is full.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if shutil.disk_usage(path.parent).free < SPARE:
+        raise StorageError.of(
+            "disk-full", f"{path} cannot be written, as ", " Run the same command again."
+        )
+    write_atomic(path, write)
 
 
 @contextmanager

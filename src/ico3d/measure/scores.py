@@ -9,7 +9,7 @@ from PIL import Image
 
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View
-from ico3d.common.files import write_atomic
+from ico3d.common.files import write_one_of_many
 from ico3d.common.psnr import psnr
 from ico3d.measure.pictures.lpips import lpips
 from ico3d.measure.pictures.ms_ssim import ms_ssim
@@ -63,4 +63,4 @@ def write_pictures(
         if picture is None:
             continue
         path = folder / part / view.camera.name / f"{view.frame:06d}.png"
-        write_atomic(path, Image.fromarray(to_bytes(picture)).save)
+        write_one_of_many(path, Image.fromarray(to_bytes(picture)).save)

@@ -116,6 +116,8 @@ class Clip:
 
     def at(self, times: Array | float) -> Array:
         """(..., M, 4) rotations wxyz of the moved roles at times (...) in seconds."""
+        if not self.curves:
+            return np.zeros((*np.shape(times), 0, 4))
         return np.stack([curve.at(times) for curve in self.curves.values()], -2)
 
     def mirrored(self) -> "Clip":

@@ -13,7 +13,7 @@ from ico3d.capture.parts.head_of_body import head_in
 from ico3d.capture.parts.held_out import PartOfCapture
 from ico3d.capture.sound import read_sound_file
 from ico3d.common.device import DeviceName
-from ico3d.common.files import write_atomic
+from ico3d.common.files import write_one_of_many
 from ico3d.errors import CaptureError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import HeadSettings
@@ -201,7 +201,7 @@ def _driven(
     camera = most_frontal_camera(capture, capture.split.test)
     frames = range(driven.num_frames)
     for frame, picture in rendered_frames(renderer, driven, camera, frames, path.stem):
-        write_atomic(folder / f"{frame:06d}.png", Image.fromarray(to_bytes(picture)).save)
+        write_one_of_many(folder / f"{frame:06d}.png", Image.fromarray(to_bytes(picture)).save)
     recorded = Recorded(folder, capture.fps, None, sound, None)
     return sync_row(folder, recorded, computing_device(terms.device))
 

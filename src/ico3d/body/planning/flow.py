@@ -20,7 +20,7 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
-from ico3d.common.files import read_small, write_atomic
+from ico3d.common.files import read_small, write_atomic, write_one_of_many
 from ico3d.common.unpacking.npz import WIDTH, read_npz
 from ico3d.errors import CaptureError, ModelError
 from ico3d.splat.initial import in_pictures, spacing
@@ -307,8 +307,8 @@ def _cached(work: _Work, folder: Path | None) -> CameraFlow:
     known = _load(file, work.steps * (1 + math.prod(work.packed)))
     if known is None:
         known = work.measure()
-        energy, moving = known
-        write_atomic(file, lambda path: np.savez_compressed(path, energy=energy, moving=moving))
+        arrays = dict(zip(("energy", "moving"), known, strict=True))
+        write_one_of_many(file, lambda path: np.savez_compressed(path, **arrays))
     return CameraFlow(work.index, work.camera, *known)
 
 

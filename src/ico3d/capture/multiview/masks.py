@@ -10,7 +10,7 @@ from PIL import Image
 from ico3d.capture.multiview.cutout import matte
 from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.multiview.reader import MultiviewCapture
-from ico3d.common.files import write_atomic
+from ico3d.common.files import write_one_of_many
 from ico3d.errors import CaptureError
 
 log = logging.getLogger(__name__)
@@ -60,7 +60,7 @@ def _masker(capture: MultiviewCapture, camera: int) -> View:
         picture = files.picture(camera, frame)
         if picture is None or plate is None:
             return 0
-        write_atomic(masks / f"{frame:06d}.png", png(matte(picture[..., :3], plate)))
+        write_one_of_many(masks / f"{frame:06d}.png", png(matte(picture[..., :3], plate)))
         return 1
 
     return write

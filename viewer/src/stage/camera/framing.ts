@@ -25,7 +25,7 @@ interface Shot {
 }
 
 const ACROSS_A_TABLE: Shot = { line: 0.3, height: 0.62, width: 0.4 }; // head and chest
-const WITH_HANDS: Shot = { line: 0.26, height: 0.73, width: 0.54 }; // down to where gestures are made, over the controls
+const WITH_HANDS: Shot = { line: 0.26, height: 0.73, width: 0.505 }; // down to where gestures are made, over the controls
 const CLOSE: Shot = { line: 0.42, height: 0.32, width: 0.26 };
 const FACE = 0.24; // m of width that are always seen
 const ABOVE = 0.03; // m over the head
