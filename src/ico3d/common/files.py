@@ -77,11 +77,24 @@ def write_one_of_many(path: Path, write: Callable[[Path], None] | bytes) -> None
         StorageError: If less than `SPARE` bytes of the disk are left, or it is full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    if shutil.disk_usage(path.parent).free < SPARE:
-        raise StorageError.of(
-            "disk-full", f"{path} cannot be written, as ", " Run the same command again."
-        )
+    check_left(path.parent, path)
     write_atomic(path, write)
+
+
+def check_left(folder: Path, written: Path) -> None:
+    """Checks that a disk has not become full while what comes from a stranger is written.
+
+    Args:
+        folder: A folder on the disk.
+        written: What the error calls that which cannot be written.
+
+    Raises:
+        StorageError: If less than `SPARE` is left.
+    """
+    if shutil.disk_usage(folder).free < SPARE:
+        raise StorageError.of(
+            "disk-full", f"{written} cannot be written, as ", " Run the same command again."
+        )
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from ico3d.motion.clip import Clip, from_bytes, header_of, meaning, other_hand, 
 from ico3d.motion.figure import NEAR, alike, figure_of
 from ico3d.motion.living import Living, living
 from ico3d.motion.roles import ROLES
-from ico3d.motion.standing import APART, APART_BEFORE, stance_of
+from ico3d.motion.standing import APART_BEFORE, stance_of
 from ico3d.rig.quaternions import Array
 from ico3d.rig.rig import Rig
 
@@ -55,10 +55,9 @@ def clips_for(content: bytes, rig: Rig) -> dict[str, Clip]:
         SettingsError: If the file is damaged, or its figure is not that of the rig.
     """
     clips = from_bytes(content)  # raises for a damaged file; the figure is checked below
-    somebody = living(rig, 0, hung_of(content))
-    stances = (stance_of(somebody.person, apart) for apart in (APART, APART_BEFORE))
-    figures = (figure_of(replace(somebody, stance=stance)) for stance in stances)
-    if not any(alike(figure, _figure(content)) for figure in figures):
+    somebody, figure = living(rig, 0, hung_of(content)), _figure(content)
+    before = replace(somebody, stance=stance_of(somebody.person, APART_BEFORE))
+    if not any(alike(figure_of(one), figure) for one in (somebody, before)):
         raise SettingsError("the file of gestures was made for another rig.")
     return clips
 

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import shutil
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,8 +77,7 @@ class Spill:
 
     def _free(self) -> int:
         """Bytes that are left on the disk."""
-        disk = os.fstatvfs(self._file.fileno())  # its folder may be gone
-        return disk.f_bavail * disk.f_frsize
+        return shutil.disk_usage(self._file.fileno()).free  # its folder may be gone
 
     def _fill(self) -> None:
         self._full = True

@@ -10,9 +10,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from ico3d.common import files
 from ico3d.common.files import SPARE, write_atomic
 from ico3d.common.people.stated import NOT_STATED
-from ico3d.errors import CaptureError, StorageError
+from ico3d.errors import CaptureError
 
 UNFINISHED = "unfinished.json"
 """File of an unfinished folder that says of whom it is, from the first picture on."""
@@ -84,10 +85,7 @@ def check_left(folder: Path) -> None:
     Raises:
         StorageError: If less than `SPARE` is left.
     """
-    if shutil.disk_usage(folder).free < SPARE:
-        raise StorageError.of(
-            "disk-full", f"{folder.parent} cannot be written, as ", " Run the same command again."
-        )
+    files.check_left(folder, folder.parent)
 
 
 def _begun(out: Path) -> tuple[Path, int]:
