@@ -307,8 +307,8 @@ def _cached(work: _Work, folder: Path | None) -> CameraFlow:
     known = _load(file, work.steps * (1 + math.prod(work.packed)))
     if known is None:
         known = work.measure()
-        arrays = dict(zip(("energy", "moving"), known, strict=True))
-        write_one_of_many(file, lambda path: np.savez_compressed(path, **arrays))
+        energy, moving = known
+        write_one_of_many(file, lambda to: np.savez_compressed(to, energy=energy, moving=moving))
     return CameraFlow(work.index, work.camera, *known)
 
 
