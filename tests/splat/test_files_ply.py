@@ -1,3 +1,4 @@
+import shutil
 import time
 import tracemalloc
 
@@ -8,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from ico3d.errors import GaussianFileError
+from ico3d.common.files import SPARE
+from ico3d.errors import GaussianFileError, StorageError
 from ico3d.splat.files.formats import read_file, read_gaussians, write_gaussians
 from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.files.standard_ply import header, property_order
@@ -208,6 +210,20 @@ def test_normals_that_are_not_whole_are_none(tmp_path):
     data = ply_bytes(random_gaussians(3, 0), tmp_path).replace(b"float nz", b"float no")
     (tmp_path / "a.ply").write_bytes(data)
     assert read_gaussians(tmp_path / "a.ply").normals is None
+
+
+def test_a_file_leaves_room_on_the_disk(tmp_path, monkeypatch):
+    """A file of holes, which takes no room itself, was converted until the disk was full."""
+    gaussians = random_gaussians(40, 1)
+    size = 40 * (3 + 3 + 9 + 1 + 3 + 4 + 3) * 4
+    assert gaussians.nbytes == size
+    usage = shutil.disk_usage(tmp_path)
+    free = iter([size + SPARE, size + SPARE - 1])
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=next(free)))
+    write_gaussians(tmp_path / "a.ply", gaussians)
+    with pytest.raises(StorageError, match=r"b\.ply cannot be written, as the disk is full"):
+        write_gaussians(tmp_path / "b.ply", gaussians)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.ply"]
 
 
 def test_a_refusal_is_a_whole_sentence(tmp_path):

@@ -81,17 +81,18 @@ def write_one_of_many(path: Path, write: Callable[[Path], None] | bytes) -> None
     write_atomic(path, write)
 
 
-def check_left(folder: Path, written: Path) -> None:
+def check_left(folder: Path, written: Path, size: int = 0) -> None:
     """Checks that a disk has not become full while what comes from a stranger is written.
 
     Args:
         folder: A folder on the disk.
         written: What the error calls that which cannot be written.
+        size: Bytes that are about to be written, where that is known.
 
     Raises:
-        StorageError: If less than `SPARE` is left.
+        StorageError: If less than these and `SPARE` are left.
     """
-    if shutil.disk_usage(folder).free < SPARE:
+    if shutil.disk_usage(folder).free < size + SPARE:
         raise StorageError.of(
             "disk-full", f"{written} cannot be written, as ", " Run the same command again."
         )

@@ -1,6 +1,7 @@
 """Films of a body: paths of cameras, time, and the file."""
 
 import json
+import shutil
 from pathlib import Path
 
 import av
@@ -15,7 +16,8 @@ from ico3d.avatar.film.film import pictures
 from ico3d.avatar.film.video import write_video
 from ico3d.avatar.moving import back_and_forth, extent
 from ico3d.common.camera import look_at
-from ico3d.errors import CaptureError, ModelError, SettingsError
+from ico3d.common.files import SPARE
+from ico3d.errors import CaptureError, ModelError, SettingsError, StorageError
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.true_body import still_body, true_body
 from support.captures import open_with
@@ -176,6 +178,20 @@ def test_a_broken_film_leaves_nothing(tmp_path):
     with pytest.raises(RuntimeError):
         write_video(tmp_path / "v.mp4", broken(), (WIDTH, HEIGHT), 30)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_leaves_room_on_the_disk(tmp_path, monkeypatch):
+    usage, drawn = shutil.disk_usage(tmp_path), []
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=SPARE + 1 - len(drawn)))
+
+    def endless():
+        while True:
+            drawn.append(np.zeros((32, 32, 3), np.uint8))
+            yield drawn[-1]
+
+    with pytest.raises(StorageError, match=r"a\.mp4 cannot be written, as the disk is full"):
+        write_video(tmp_path / "a.mp4", endless(), (32, 32), 25)
+    assert len(drawn) == 2 and not list(tmp_path.iterdir())
 
 
 def test_the_verb_films_a_body(tmp_path, capture, capsys):

@@ -180,32 +180,61 @@ def test_a_new_sentence_does_not_wait_for_the_answer_to_another(model, sha256):
         wire.close()
 
 
-def test_a_server_that_does_not_read_is_not_waited_for(model, sha256):
+def greeted(listener, sha256):
+    """The far end of the next line, once it was greeted, and its protocol."""
     own = {"model": sha256, "rate": RATE, "fps": 25, "size": 32}
+    wire, protocol = listener.accept()[0], ServerProtocol()
+    protocol.receive_data(wire.recv(1 << 16))
+    protocol.send_response(protocol.accept(protocol.events_received()[0]))
+    protocol.send_text(json.dumps(own).encode())
+    wire.sendall(b"".join(protocol.data_to_send()))
+    return wire, protocol
 
-    def greet():
-        wires.append(listener.accept()[0])
-        protocol = ServerProtocol()
-        protocol.receive_data(wires[0].recv(1 << 16))
-        protocol.send_response(protocol.accept(protocol.events_received()[0]))
-        protocol.send_text(json.dumps(own).encode())
-        wires[0].sendall(b"".join(protocol.data_to_send()))
+
+def asked(made, message):
+    """A thread that asks for rows, and what it is told instead."""
+    said = []
 
     def ask():
         try:
-            made.ask(0, bytes(64 << 20), False, range(9))
+            made.ask(0, message, False, range(9))
         except FAILURES as error:
             said.append(error)
 
-    wires, said = [], []
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    return asking, said
+
+
+def test_a_server_that_does_not_read_is_not_waited_for(model, sha256):
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        threading.Thread(target=greet, daemon=True).start()
         made = mouth(f"http://127.0.0.1:{listener.getsockname()[1]}", model, sha256, SHORT)
-        asking = threading.Thread(target=ask, daemon=True)
-        asking.start()
+        asking, said = asked(made, bytes(64 << 20))
+        wire, _ = greeted(listener, sha256)
         asking.join(LONG)
         assert not asking.is_alive() and len(said) == 1
-        wires[0].close()
+        wire.close()
+
+
+def test_a_server_that_only_pings_leaves_nothing_behind(model, sha256):
+    """An answer to a ping was stuck, which closing waited for: two threads were left each time."""
+    before = set(threading.enumerate())
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        made = mouth(f"http://127.0.0.1:{listener.getsockname()[1]}", model, sha256, SHORT)
+        asking, said = asked(made, b"")
+        wire, protocol = greeted(listener, sha256)
+        wire.settimeout(LONG)
+        protocol.send_ping(bytes(125))
+        pings = b"".join(protocol.data_to_send()) * 1000
+        with pytest.raises(OSError):  # it was cut; till then it takes all
+            while True:
+                wire.sendall(pings)
+        asking.join(LONG)
+        for thread in set(threading.enumerate()) - before:
+            thread.join(LONG)
+        assert len(said) == 1 and set(threading.enumerate()) <= before
+        wire.close()
 
 
 async def test_a_server_with_an_odd_greeting_is_left(model, sha256, sound):

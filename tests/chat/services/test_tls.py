@@ -126,6 +126,15 @@ def test_no_server_names_the_numbers_of_an_exchange():
         assert context.verify_mode == ssl.CERT_REQUIRED and context.check_hostname
 
 
+def test_certificates_are_read_once(monkeypatch, certificate):
+    """A question may call 32 functions, and reading certificates held everybody up."""
+    first = aiohttp_context(), client_context()
+    assert aiohttp_context() is first[0] and client_context() is first[1]
+    assert client_context(trust_env=False) is not first[1]
+    monkeypatch.delenv("SSL_CERT_FILE")
+    assert aiohttp_context() is not first[0] and client_context() is not first[1]
+
+
 def aiohttp_context() -> ssl.SSLContext:
     """What calls of tools are made with."""
 

@@ -209,6 +209,27 @@ async def test_streams_are_not_opened_again_without_a_pause(monkeypatch, is_resu
         await connection.close()
 
 
+async def test_no_more_than_a_few_streams_wait_to_be_opened(monkeypatch):
+    """Calls that were answered on another stream resumed their own while a visitor stayed."""
+    from ico3d.chat.tools import bounded_http
+
+    async def answer(transport, request):
+        return httpx2.Response(200)
+
+    monkeypatch.setattr(bounded_http, "STREAMS_AT_ONCE", 1.0)
+    monkeypatch.setattr(httpx2.AsyncHTTPTransport, "handle_async_request", answer)
+    transport = bounded_http.BoundedTransport(2.0, trust_env=False)
+    async with httpx2.AsyncClient(transport=transport) as client:
+        opened = [asyncio.create_task(client.get("http://127.0.0.1/")) for _ in range(40)]
+        refused = await asyncio.wait_for(asyncio.gather(*opened[11:], return_exceptions=True), 5)
+        assert {str(error) for error in refused} == {"it ends too many streams"}
+        assert (await opened[0]).is_success
+        for waiting in opened[1:11]:
+            waiting.cancel()
+        await asyncio.wait(opened)
+        assert transport._waiting == 0
+
+
 @pytest.mark.real_time
 async def test_a_server_that_does_not_let_go_keeps_nobody(monkeypatch):
     """Visits left connections behind, the server no longer ended, and a call had no end."""

@@ -80,7 +80,7 @@ def test_knitwear_repeats():
     assert stitch(0.0, 0.0, 1e-4) == pytest.approx(0, abs=1e-9)  # the valley between two columns
 
 
-@pytest.mark.parametrize("pixel", [0.0008, 0.002, 0.006])
+@pytest.mark.parametrize("pixel", [0.0004, 0.001, 0.003])
 def test_a_plain_jumper_has_one_colour_and_is_as_bright_from_near_as_from_far(pixel):
     wool = SimpleNamespace(jumper=(0.05, 0.13, 0.15))
     middle = Weave(0.0, 0.0, 0.0, 0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 9.0, 0.0)
@@ -93,8 +93,8 @@ def test_a_plain_jumper_has_one_colour_and_is_as_bright_from_near_as_from_far(pi
     np.testing.assert_allclose(tones, tones[:, :1] * np.ones(3), rtol=1e-9)
     assert tones.mean() == pytest.approx(1, abs=0.015)
     assert min(heights) >= 0 and max(heights) <= RAISED
-    fine = pixel == 0.006  # a column of stitches is as wide as two such pixels
-    assert (np.ptp(tones) < 0.08) == fine and (np.ptp(heights) < 0.0002) == fine
+    fine = pixel == 0.003  # as wide as a column of stitches
+    assert (np.ptp(tones) < 0.08) == fine and (np.ptp(heights) < 0.0001) == fine
 
 
 def test_a_jumper_that_hangs_in_folds_has_none_painted(sleeve):

@@ -5,6 +5,7 @@ import { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
 import { drawnBy } from '../../support/browser/path.ts';
 import { keepSound } from '../../support/browser/talk.ts';
+import { slowness } from '../../support/slowness.ts';
 
 const { talkingUrl } = inject('shared');
 
@@ -61,6 +62,45 @@ test('axe finds nothing serious in any state of the page', async () => {
   line!.send(JSON.stringify({ type: 'error', message: 'Over.', fatal: true, again: true, code: 'idle', values: { minutes: 5 } }));
   await page.waitForSelector('#again:visible');
   await judge(page, 'ended');
+});
+
+test('thousands of notices and of long questions keep nobody', async () => {
+  browser = await Browser.launch({ width: 900, height: 700, calm: true });
+  const { page } = browser;
+  let line: WebSocketRoute | undefined;
+  let welcome: object | undefined;
+  await page.routeWebSocket(/\/ws/, (socket) => {
+    line = socket;
+    socket.connectToServer().onMessage((message) => {
+      if (typeof message === 'string' && message.includes('"welcome"')) welcome = JSON.parse(message) as object;
+      socket.send(message);
+    });
+  });
+  await page.goto(drawnBy('soft', talkingUrl));
+  await page.waitForFunction(() => document.querySelector('#answer')!.textContent === 'Hello.');
+  await pauseDrawing(page);
+  const text = '\u07da\u20dd'.repeat(1990);
+  const send = (message: object) => line!.send(JSON.stringify(message));
+  const begin = performance.now();
+  for (let i = 0; i < 30; i++) send({ ...welcome, resumed: true, notices: Array.from({ length: 300 }, (_, k) => ({ code: 'x', text: `${i} ${k}` })) });
+  for (let i = 0; i < 150; i++) send({ type: 'transcript', text: `${text}${i}`, final: true });
+  await page.waitForFunction(() => document.getElementById('record')!.textContent!.endsWith('149'));
+  expect(performance.now() - begin).toBeLessThan(4000 * slowness())
+  expect(await page.locator('#notices p').count()).toBe(5);
+  const rows = () => page.locator('#record p').count();
+  expect(await rows()).toBeLessThan(60);
+  await page.click('#drawer-button');
+  await page.waitForFunction(() => document.getElementById('record')!.scrollTop > 0);
+  const { scrollTop, scrollHeight, clientHeight } = await page.evaluate(() => {
+    const { scrollTop, scrollHeight, clientHeight } = document.getElementById('record')!;
+    return { scrollTop, scrollHeight, clientHeight };
+  });
+  expect(scrollHeight - scrollTop - clientHeight).toBeLessThan(40); // the newest words are seen
+  send({ type: 'transcript', text: 'The last one.', final: true });
+  await page.waitForFunction(() => {
+    const list = document.getElementById('record')!;
+    return list.textContent!.endsWith('The last one.') && list.scrollHeight - list.scrollTop - list.clientHeight < 40;
+  });
 });
 
 test('axe finds nothing serious in the check of the device', async () => {

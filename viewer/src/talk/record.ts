@@ -25,6 +25,8 @@ const JOINED = /[\u3000-\u3029\u3030-\u3098\u309b-\u30ff\u3400-\u9fff\uff00-\uff
 const MOST_ENTRIES = 1000;
 /** Entries of talks before this one. */
 const MOST_EARLIER = 200;
+/** Letters of all entries of this talk, and of all of talks before it. */
+const MOST_IN_ALL = 200_000;
 /** Letters of an answer that are kept, and clauses of a sentence that goes on: servers say 4,000 at most. */
 const MOST_LETTERS = 8000;
 const MOST_BEFORE = 4000;
@@ -36,6 +38,7 @@ export class TalkRecord {
   earlier: readonly Entry[];
   private readonly events: RecordEvents;
   private answer: { utterance: number; entry: Entry; sentences: Map<number, Progress>; letters: number } | null = null;
+  private letters = 0; // of all entries
   private resumed = false; // and nothing new was said
   private closed = false; // the talk is over, and another visitor may begin the next one
 
@@ -48,7 +51,7 @@ export class TalkRecord {
   /** What stays for this visitor when another talk begins: talks in which they said something. */
   get lasting(): readonly Entry[] {
     if (this.closed) return [];
-    return this.entries.some(({ who }) => who === 'you') ? [...this.earlier, ...this.entries].slice(-MOST_EARLIER) : this.earlier;
+    return this.entries.some(({ who }) => who === 'you') ? newest([...this.earlier, ...this.entries], MOST_EARLIER, MOST_IN_ALL) : this.earlier;
   }
 
   /** The visitor has asked; after a lost connection the server may repeat the last question. */
@@ -71,9 +74,10 @@ export class TalkRecord {
     if (letters > MOST_LETTERS) return;
     this.answer.letters = letters;
     sentences.set(progress.first, progress);
+    const had = entry.text.length;
     entry.text = joined([...sentences.values()].map(({ text, heard }) => text.slice(0, heard).trim()));
     if (!entry.text) return;
-    if (this.entries.includes(entry)) this.events.changed(entry);
+    if (this.entries.includes(entry)) this.tell(entry, entry.text.length - had);
     else this.add(entry);
   }
 
@@ -86,7 +90,7 @@ export class TalkRecord {
     if (!interrupted || !entry.text || (last.heard === last.text.length && ENDED.test(last.text))) return;
     entry.cut = true;
     entry.text += CUT;
-    this.events.changed(entry);
+    this.tell(entry, CUT.length);
   }
 
   /** The last answer, as far as it was heard. */
@@ -120,14 +124,32 @@ export class TalkRecord {
     this.closed = false;
     this.answer = null;
     this.entries = [];
+    this.letters = 0;
     this.events.renewed();
   }
 
   private add(entry: Entry): void {
     this.entries.push(entry);
-    this.events.changed(entry);
-    if (this.entries.length > MOST_ENTRIES) this.events.dropped(this.entries.shift()!);
+    this.tell(entry, entry.text.length);
   }
+
+  /** Tells of an entry that has so many letters more; the oldest ones make room for it. */
+  private tell(entry: Entry, letters: number): void {
+    this.letters += letters;
+    this.events.changed(entry);
+    while (this.entries.length > 1 && (this.entries.length > MOST_ENTRIES || this.letters > MOST_IN_ALL)) {
+      const oldest = this.entries.shift()!;
+      this.letters -= oldest.text.length;
+      this.events.dropped(oldest);
+    }
+  }
+}
+
+/** The newest entries: so many at most, and with so many letters. */
+export function newest(entries: readonly Entry[], most: number, letters: number): readonly Entry[] {
+  let [first, left] = [entries.length, letters];
+  while (first > Math.max(0, entries.length - most) && (left -= entries[first - 1]!.text.length) >= 0) first -= 1;
+  return entries.slice(first);
 }
 
 /** A sentence as far as it has come, of which some units may not have been heard. */

@@ -19,6 +19,7 @@ import { StandIns } from './stand-ins.ts';
 import { suggest } from './suggestions.ts';
 
 const NOTICE_TIME = 9000; // ms
+const MOST_NOTICES = 5;
 
 /** What is around the picture. */
 export interface Page {
@@ -138,12 +139,14 @@ export function makePage(
   return { view, talk };
 }
 
-/** Shows a sentence for some seconds; one that is there already stays as it is: many would cover the face. */
+/** Shows a sentence for some seconds; of many, which would cover the face, the newest. One that is there already stays as it is. */
 export function showNotice(root: ParentNode, words: PageWords, sentence: Sentence): void {
   const text = words.text(sentence);
-  if ([...byId(root, 'notices').children].some(({ textContent }) => textContent === text)) return;
+  const notices = byId(root, 'notices');
+  if ([...notices.children].some(({ textContent }) => textContent === text)) return;
   const item = document.createElement('p');
   words.write(item, sentence);
-  byId(root, 'notices').append(item);
+  notices.append(item);
+  if (notices.children.length > MOST_NOTICES) notices.firstElementChild!.remove();
   setTimeout(() => item.remove(), NOTICE_TIME);
 }

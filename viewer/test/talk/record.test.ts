@@ -1,5 +1,5 @@
 import { expect, test, vi } from 'vitest';
-import { RunningSentence, TalkRecord, type Entry } from '../../src/talk/record.ts';
+import { newest, RunningSentence, TalkRecord, type Entry } from '../../src/talk/record.ts';
 
 const line = (text: string): Entry => ({ who: 'you', at: new Date(), text, cut: false });
 
@@ -81,6 +81,34 @@ test('a record has room for a thousand entries, and drops the oldest', () => {
   for (let i = 0; i < 1003; i++) record.asked(`${i}`);
   expect(record.entries.length).toBe(1000);
   expect(dropped.map(({ text }) => text)).toEqual(['0', '1', '2']);
+});
+
+test('a record has room for two hundred thousand letters, of this talk and of those before it', () => {
+  const dropped: Entry[] = [];
+  const record = new TalkRecord({ changed: () => {}, dropped: (entry) => dropped.push(entry), renewed: () => {} });
+  for (let i = 0; i < 60; i++) record.asked('a'.repeat(4000));
+  expect([record.entries.length, dropped.length]).toEqual([50, 10]);
+  record.heard({ utterance: 0, first: 0, text: 'b'.repeat(5000), heard: 3000 });
+  expect(record.entries.length).toBe(50);
+  record.heard({ utterance: 0, first: 0, text: 'b'.repeat(5000), heard: 5000 }); // it grows into the room of another one
+  record.over(0, true);
+  expect([record.entries.length, record.answered]).toEqual([49, `${'b'.repeat(5000)} …`]);
+  record.begin(false);
+  for (let i = 0; i < 30; i++) record.asked('c'.repeat(4000));
+  expect([record.entries.length, record.lasting.length, record.lasting.at(19)!.text[0]]).toEqual([30, 49, 'c']);
+  record.clear();
+  record.asked('d'.repeat(300_000)); // the last one stays, whatever it is
+  expect(record.entries.length).toBe(1);
+});
+
+test('the newest entries are those at the end, so many and with so many letters', () => {
+  const entries = ['one', 'two', 'three', 'four'].map(line);
+  const texts = (most: number, letters: number) => newest(entries, most, letters).map(({ text }) => text);
+  expect(texts(9, 99)).toEqual(['one', 'two', 'three', 'four']);
+  expect(texts(2, 99)).toEqual(['three', 'four']);
+  expect(texts(9, 9)).toEqual(['three', 'four']);
+  expect(texts(9, 8)).toEqual(['four']);
+  expect(texts(9, 3)).toEqual([]);
 });
 
 test('an answer without an end is kept as far as eight thousand letters, quickly', () => {

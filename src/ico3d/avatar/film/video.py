@@ -1,6 +1,6 @@
 """Writes video files: H.264 pictures and AAC sound in MP4."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ico3d.capture.capture import Sound
-from ico3d.common.files import write_atomic
+from ico3d.common.files import check_left, write_atomic
 from ico3d.errors import MissingExtraError
 
 if TYPE_CHECKING:
@@ -43,12 +43,19 @@ def write_video(
 
     Raises:
         MissingExtraError: If PyAV is not installed.
+        StorageError: If the disk becomes full; it is not filled to its last byte.
     """
     try:
         import av  # noqa: F401
     except ModuleNotFoundError:
         raise MissingExtraError("av", "train", "writing videos") from None
-    write_atomic(path, lambda temporary: _encode(temporary, pictures, size, fps, sound))
+
+    def watched() -> Iterator[np.ndarray]:
+        for picture in pictures:
+            check_left(path.parent, path)
+            yield picture
+
+    write_atomic(path, lambda temporary: _encode(temporary, watched(), size, fps, sound))
 
 
 def _encode(

@@ -56,9 +56,10 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
     with new_folder(out, settings.likeness, sources) as work:
         _copy(work, places, cameras, frames)
         if foreign.points is not None:
+            points = (settings.scale * foreign.points @ turn.T).astype(np.float32)
+            check_room(work, points.nbytes)
             (work / "points").mkdir()
-            points = settings.scale * foreign.points @ turn.T
-            np.save(work / "points" / "000000.npy", points.astype(np.float32))
+            np.save(work / "points" / "000000.npy", points)
         about.write(work)
         MultiviewCapture(work)  # what cannot be opened, such as a wild lens, is not written
     return about

@@ -5,8 +5,10 @@ looks at each piece anew. A server that names the numbers of a Diffie-Hellman ex
 client compute for 0.6 s.
 """
 
+import os
 import ssl
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 CIPHERS = "ECDHE+AESGCM:ECDHE+CHACHA20"
@@ -44,19 +46,41 @@ def _joined(read: Callable[[int], bytes], most: int) -> bytes:
 
 
 def client_context(trust_env: bool = True) -> ssl.SSLContext:
-    """A context for clients, with the certificates that httpx trusts. Slow when first called.
+    """The context of clients, with the certificates that httpx trusts. Slow when first called.
 
     Args:
         trust_env: Whether the environment may name others.
     """
+    return _client_context(trust_env, _named())
+
+
+def system_context() -> ssl.SSLContext:
+    """The context of clients that trust the certificates of the system. Slow when first called."""
+    return _system_context(_named())
+
+
+def _named() -> tuple[str | None, ...]:
+    """The certificates that the environment names."""
+    return tuple(map(os.environ.get, ("SSL_CERT_FILE", "SSL_CERT_DIR")))
+
+
+# Reading all certificates takes 25 ms, for which everybody would wait at each call. Those of a
+# later date are read when the server starts again.
+@lru_cache
+def _client_context(trust_env: bool, named: tuple[str | None, ...]) -> ssl.SSLContext:
     import httpx2
 
-    context = quick(httpx2.create_ssl_context(trust_env=trust_env))
+    context = _quick(httpx2.create_ssl_context(trust_env=trust_env))
     context.sslobject_class = JoinedRecords
     return context
 
 
-def quick(context: ssl.SSLContext) -> ssl.SSLContext:
+@lru_cache
+def _system_context(named: tuple[str | None, ...]) -> ssl.SSLContext:
+    return _quick(ssl.create_default_context())
+
+
+def _quick(context: ssl.SSLContext) -> ssl.SSLContext:
     """A client's context, changed so that no server can have it compute for long."""
     context.set_ciphers(CIPHERS)
     context.set_ecdh_curve(CURVE)

@@ -35,6 +35,8 @@ time. An event has three or four."""
 STREAM_RATE, STREAMS_AT_ONCE = 1.0, 10.0
 """Requests per second for long, and at once, by which the SDK opens and resumes streams: where a
 server says so (`retry: 0`), it does that again without a pause."""
+MOST_WAITING = 10
+"""Streams that wait to be opened: one of a call that was answered on another is never needed."""
 
 
 class BoundedTransport(httpx2.AsyncHTTPTransport):
@@ -42,8 +44,8 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
 
     A stream of events may go on for long: each is a message, and no more than `LINE_RATE` come.
     What is no success is none, whatever its type says: the SDK keeps a redirect's body whole.
-    What opens streams anew waits if that is too soon; calls, which are sent by POST, do not. What
-    ends a session is answered within `ENDING`, or not at all.
+    What opens streams anew waits if that is too soon, and fails where many wait; calls, which
+    are sent by POST, do not. What ends a session is answered within `ENDING`, or not at all.
     """
 
     def __init__(self, seconds: float, trust_env: bool = True):
@@ -58,18 +60,18 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
         self._bytes = Bucket(BYTE_RATE, BYTES_AT_ONCE, time.monotonic)
         self._lines = Bucket(LINE_RATE, LINES_AT_ONCE, time.monotonic)  # of all streams
         self._streams = Bucket(STREAM_RATE, STREAMS_AT_ONCE, time.monotonic)
+        self._waiting = 0
 
     async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
         """Sends a request.
 
         Raises:
-            ReadError: If the answer is compressed; while it is read, if it is large or has too many
-                events.
+            ReadError: If the answer is compressed, or too many streams wait; while it is read, if
+                it is large or has too many events.
         """
         await ask_plain(request)
         if request.method == "GET":
-            while not self._streams.take(1):
-                await asyncio.sleep(1 / STREAM_RATE)
+            await self._take_turn()
         if request.method == "POST":
             waits = dict(request.extensions.get("timeout", {}))
             request.extensions = {**request.extensions, "timeout": waits | {"read": self._seconds}}
@@ -83,6 +85,16 @@ class BoundedTransport(httpx2.AsyncHTTPTransport):
         else:
             response.stream = Whole(stream, MESSAGE)
         return response
+
+    async def _take_turn(self) -> None:
+        if self._waiting >= MOST_WAITING:
+            raise httpx2.ReadError("it ends too many streams")
+        self._waiting += 1
+        try:
+            while not self._streams.take(1):
+                await asyncio.sleep(1 / STREAM_RATE)
+        finally:
+            self._waiting -= 1
 
     async def _ended(self, request: httpx2.Request) -> httpx2.Response:
         """The answer to the end of a session, of which nobody wants more than its status."""

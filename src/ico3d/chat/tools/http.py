@@ -9,7 +9,6 @@ import contextlib
 import ipaddress
 import json
 import socket
-import ssl
 from collections.abc import Mapping
 from functools import partial
 from itertools import accumulate
@@ -23,7 +22,7 @@ from aiohttp.resolver import DefaultResolver
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.services.llm_service import FunctionCallParams
 
-from ico3d.chat.services.tls import quick
+from ico3d.chat.services.tls import system_context
 from ico3d.chat.settings.headers import blanked, filled_in
 from ico3d.chat.settings.tools import PORTS, Tool, host_of
 from ico3d.chat.wire.characters import sendable_json
@@ -71,7 +70,7 @@ class BoundedConnector(aiohttp.TCPConnector):
 
     def __init__(self, resolver: AbstractResolver):
         """Asks `resolver` for addresses."""
-        super().__init__(resolver=resolver, ssl=quick(ssl.create_default_context()))
+        super().__init__(resolver=resolver, ssl=system_context())
         self._factory = partial(_BoundedAnswers, loop=self._loop)
 
 

@@ -11,11 +11,12 @@ from ico3d.motion.roles import INDEX, MIRROR, ROLES
 from ico3d.motion.turning import about, mirrored
 from ico3d.rig.quaternions import IDENTITY, Array, multiply
 
-BACK, INWARD, BEND, PRONATED = np.radians([5.0, 14.0, 17.0, 14.0])
+BACK, INWARD, BEND, PRONATED = np.radians([5.0, 35.0, 17.0, -5.0])
 """Angles in radians of a hanging arm.
 
 They are how far the upper arm hangs back and is turned inwards, how far the elbow bends, and by
-how much the forearm is pronated.
+how much the forearm is pronated. Turned inwards, a bent elbow lets the forearm hang straight down
+where clothes hold the upper arm off the body.
 """
 MOST = np.radians(20.0)
 """Largest angle in radians between hanging arms and the vertical, sideways."""

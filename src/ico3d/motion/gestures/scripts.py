@@ -84,7 +84,7 @@ def _both(
 
 
 # Hands of somebody who is seen across a table are before the chest: lower ones would be hidden.
-_ELBOW = (0.5, -0.82, -0.3)
+_ELBOW = (0.15, -0.93, -0.34)
 
 # The elbow is beside the trunk, under the hand: an arm that points at who looks has no bones.
 _WAVE = Reach((0.11, 0.13, 0.34), (0.42, -0.9, -0.4), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.common.files import MOST_BYTES, check_regular, read_small, write_atomic
+from ico3d.common.files import MOST_BYTES, check_left, check_regular, read_small, write_atomic
 from ico3d.common.spz.container import GZIP_MAGIC, MAGIC
 from ico3d.common.unpacking.memory import lacks_room
 from ico3d.errors import GaussianFileError, SettingsError
@@ -120,12 +120,18 @@ def write_gaussians(path: Path | str, gaussians: RawGaussians) -> None:
     Raises:
         SettingsError: If the name has another suffix.
         GaussianFileError: If a value is not finite, or the file cannot be written.
+        StorageError: If the disk has no room for them and some more; a file of holes takes none.
     """
     path = Path(path)
     check_writable(path)
     write = _WRITERS[path.suffix.lower()]
     gaussians.checked()
+
+    def written(temporary: Path) -> None:
+        check_left(temporary.parent, path, gaussians.nbytes)
+        write(gaussians, temporary)
+
     try:
-        write_atomic(path, lambda temporary: write(gaussians, temporary))
+        write_atomic(path, written)
     except OSError as error:
         raise GaussianFileError(f"{path}: cannot be written ({error.strerror}).") from None

@@ -66,6 +66,11 @@ class RawGaussians:
         return len(self.means)
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of all parameters."""
+        return sum(part.nbytes for part in vars(self).values() if part is not None)
+
+    @property
     def degree(self) -> int:
         """The degree of the spherical harmonics, 0 to 3."""
         return harmonics.degree_of(self.rest.shape[1] + 1)

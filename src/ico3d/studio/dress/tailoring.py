@@ -12,7 +12,7 @@ from ico3d.studio.person.subject import Material, Subject
 
 COLLAR_RIB, HEM_RIB, LEG_HEM = 0.026, 0.055, 0.022
 """Widths of the ribbed collar, of ribbed cuffs and hem, and of a trouser leg's hem, metres."""
-RIB = 0.0075
+RIB = 0.0055
 """Width of a rib, metres."""
 FOLD, FOLD_ACROSS = 0.066, 0.080
 """Distance of folds along a limb, and their length across it, metres."""

@@ -90,7 +90,7 @@ FAIR = Look(
     cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
     stripes=False,
     freckles=0.55,
-    jumper=(0.100, 0.198, 0.230),
+    jumper=(0.036, 0.086, 0.112),
     stubble=0.0,
 )
 TANNED = Look(

@@ -100,7 +100,7 @@ export class Captions {
     this.nextWords.textContent = next;
     if (this.scrolls) return;
     this.scrolls = true;
-    queueMicrotask(() => this.scroll()); // once for all that is written until then
+    requestAnimationFrame(() => this.scroll()); // once for all that is written until the next picture
   }
 
   /**

@@ -1,5 +1,5 @@
 import type { Progress } from '../../talk/captioning.ts';
-import { TalkRecord, type Entry } from '../../talk/record.ts';
+import { newest, TalkRecord, type Entry } from '../../talk/record.ts';
 import type { PageWords } from '../../words/page-words.ts';
 import { say, type Sentence } from '../../words/text.ts';
 import { copyText, plain, saveText } from './clipboard.ts';
@@ -10,6 +10,9 @@ import { icon } from '../icons.ts';
 import { isFor, isForOthers } from '../keyboard/keys.ts';
 
 const TOLD = 4000; // ms for which it says what a button has done
+/** Entries, and letters of these, that screen readers are told at once, the newest ones. */
+const MOST_ANNOUNCED = 20;
+const MOST_LETTERS = 10_000;
 const END = 40; // pixels from the lower end within which the record follows what is said
 
 /** Who talks. */
@@ -72,6 +75,10 @@ export class Transcript {
     button.hidden = false;
   }
 
+  private get isOpen(): boolean {
+    return this.page.hasAttribute('data-drawer');
+  }
+
   private get isOffered(): boolean {
     return !byId(this.page, 'drawer-button').hidden;
   }
@@ -102,7 +109,7 @@ export class Transcript {
     const news = this.record.entries.slice(this.announced);
     if (news.length === 0 || this.record.isOpen) return;
     this.announced += news.length;
-    if (wanted) byId(this.page, 'announcer').replaceChildren(...news.map((entry) => this.paragraph(this.line(entry))));
+    if (wanted) byId(this.page, 'announcer').replaceChildren(...newest(news, MOST_ANNOUNCED, MOST_LETTERS).map((entry) => this.paragraph(this.line(entry))));
   }
 
   private opened(open: boolean): void {
@@ -133,8 +140,11 @@ export class Transcript {
     this.drawing ??= requestAnimationFrame(() => {
       this.drawing = undefined;
       if (this.anew) return this.draw();
+      const { list } = this;
+      const follows = this.isOpen && list.scrollHeight - list.scrollTop - list.clientHeight < END;
       for (const entry of this.news) this.show(entry);
       this.news.clear();
+      if (follows) list.scrollTop = list.scrollHeight;
     });
   }
 
@@ -162,11 +172,8 @@ export class Transcript {
   }
 
   private show(entry: Entry): void {
-    const { list } = this;
-    const follows = list.scrollHeight - list.scrollTop - list.clientHeight < END;
     const row = this.rows.get(entry) ?? this.add(entry);
     row.lastElementChild!.textContent = entry.text;
-    if (follows) list.scrollTop = list.scrollHeight;
   }
 
   private add(entry: Entry): HTMLElement {

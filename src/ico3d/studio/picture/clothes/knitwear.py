@@ -61,7 +61,7 @@ def jeans(colors, w, x, y, z, pixel):
     streak = grain(w.u * 4.0, w.v * 0.25, 0.0, 0.011, 0.6 * pixel)
     worn += 0.05 * streak + 0.03 * grain(x, y, z, 0.004, pixel)
     weave = visible(TWILL, 2.0 * pixel) * math.sin(twill(w.u, w.v))
-    worn = min(1.0, max(0.0, 0.22 + worn + 0.07 * weave))
+    worn = min(1.0, max(0.0, 0.10 + worn + 0.07 * weave))
     dark, pale = colors.jeans[0], colors.jeans[1]
     r = dark[0] + (pale[0] - dark[0]) * worn
     g = dark[1] + (pale[1] - dark[1]) * worn
