@@ -14,8 +14,9 @@ export class ExpressionTrack {
     this.fps = fps;
   }
 
-  /** Adds rows from index `first` on. */
+  /** Adds rows from index `first` on; none that leave a gap, which no server does that keeps to the protocol. */
   add(first: number, { rows, columns, values }: Matrix): void {
+    if (!this.empty && (first > this.rows.length || first + rows < this.first)) return;
     this.kept += values.length;
     if (this.kept > MOST_VALUES) return;
     this.first = Math.min(this.first, first);

@@ -20,6 +20,19 @@ test('an expression track that was joined late holds its first row before that',
   expect([...out]).toEqual([3, 0]);
 });
 
+test('rows that leave a gap are not taken: a face could not be drawn there', () => {
+  const track = new ExpressionTrack(FPS);
+  const out = new Float32Array(1);
+  track.add(5, matrix([5], [6]));
+  for (const first of [8, 2 ** 40, 2]) track.add(first, matrix([9], [9]));
+  track.add(3, matrix([3], [4])); // what was missing before
+  track.add(7, matrix([7]));
+  for (const [seconds, value] of [[0, 3], [0.16, 4], [0.22, 5.5], [9, 7]] as const) {
+    track.at(seconds, out);
+    expect(out[0]).toBeCloseTo(value, 5);
+  }
+});
+
 describe('an expression track', () => {
   const track = new ExpressionTrack(FPS);
   track.add(0, matrix([0, 10], [1, 20]));

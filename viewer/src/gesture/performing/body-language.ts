@@ -13,6 +13,9 @@ import { directionTo, Gaze } from './gaze.ts';
 import { Listener, Loudness } from './listening.ts';
 import { Performer, type Clock } from './performer.ts';
 
+/** Utterances that wait to be heard; of more, the first is stopped. */
+const MOST_CLOCKS = 100;
+
 /**
  * Poses a person's rig: the person stands, looks at the visitor, nods, and gestures as the server directs.
  *
@@ -101,6 +104,7 @@ export class BodyLanguage {
   private clock(utterance: number): Clock {
     const clock = this.clocks.get(utterance) ?? { offset: Infinity };
     this.clocks.set(utterance, clock);
+    if (this.clocks.size > MOST_CLOCKS) this.stop(this.clocks.keys().next().value!);
     return clock;
   }
 
