@@ -77,6 +77,17 @@ def test_of_many_messages_that_are_none_one_is_told():
     assert refused.value.error_count() == 1
 
 
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [(["a"], "each part of content"), ({"a": 1}, "must be a text"), (5, "text")],
+)
+def test_messages_say_something_or_nothing(content, sentence):
+    with pytest.raises(ValidationError, match=sentence):
+        ChatRequest.model_validate({"messages": [{"role": "user", "content": content}]})
+    for fine in (None, "", [], [{"type": "text", "text": "Hello."}]):
+        ChatRequest.model_validate({"messages": [{"role": "user", "content": fine}, {}]})
+
+
 @pytest.mark.parametrize("more", [b"", b'filename="f"; '])
 async def test_few_heads_of_a_form_are_read(monkeypatch, more):
     """A thousand files and a thousand fields: 2 ms each, in the loop."""

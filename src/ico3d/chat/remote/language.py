@@ -21,7 +21,7 @@ from pipecat.frames.frames import (
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN, LLMContext
 from pipecat.services.llm_service import FunctionCallParams
 from pipecat.services.settings import LLMSettings
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, field_validator
 
 from ico3d.chat.remote.asked import asked
 from ico3d.chat.remote.headless import Spares, run
@@ -60,6 +60,17 @@ class ChatRequest(BaseModel):
     seed: int | None = None
     frequency_penalty: float | None = None
     presence_penalty: float | None = None
+
+    @field_validator("messages")
+    @classmethod
+    def _have_content(cls, messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        for content in (message.get("content") for message in messages):
+            parts = content if isinstance(content, list) else []
+            if not (content is None or isinstance(content, str | list)):
+                raise ValueError("content must be a text, or a list of parts.")
+            if not all(isinstance(part, dict) for part in parts):
+                raise ValueError("each part of content must be an object.")
+        return messages
 
 
 def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:

@@ -90,7 +90,7 @@ class CompatibleModel(OpenAILLMService):
                 params.pop(name, None)
         if _summarising.get():
             params.pop("max_tokens", None)
-        return params
+        return _past_the_sdk(params)
 
     async def run_inference(self, *args: Any, **options: Any) -> str | None:
         """A whole answer outside of the conversation, such as a summary, of its own length."""
@@ -209,6 +209,18 @@ class CompatibleModel(OpenAILLMService):
             logger.warning(f"language goes on without functions, refused by {cause(error)}")
             self._functions_allowed = False
             return await super().get_chat_completions(context)
+
+
+def _past_the_sdk(params: dict[str, Any]) -> dict[str, Any]:
+    """Parameters of which the SDK sends messages and functions as they are.
+
+    It has nothing to convert there, and looks at each part of each message for that, in the loop of
+    everybody: at the parts of 1 MB for four seconds.
+    """
+    written = {name: params[name] for name in ("messages", "tools") if params.get(name)}
+    more = {**(params.get("extra_body") or {}), **written}
+    kept = {name: value for name, value in params.items() if name not in written}
+    return {**kept, "messages": [], "extra_body": more}
 
 
 async def _closing(
