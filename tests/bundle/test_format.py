@@ -3,14 +3,17 @@
 import json
 import os
 import re
+import shutil
 import zipfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from ico3d.bundle.archive import write_zip
 from ico3d.bundle.format import Bundle, write_bundle
-from ico3d.errors import BundleError
+from ico3d.common.files import SPARE
+from ico3d.errors import BundleError, StorageError
 from support.bundles.random_bundle import (
     random_files,
     random_head,
@@ -181,3 +184,16 @@ def test_where_no_file_can_be_written_is_one_sentence(tmp_path, name, said):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder", "pipe"]
     assert (tmp_path / "pipe").is_fifo()
     assert (tmp_path / "file").read_bytes() == b"kept"
+
+
+def test_a_bundle_leaves_room_on_the_disk(tmp_path, monkeypatch):
+    usage, path = shutil.disk_usage(tmp_path), tmp_path / "a.ico3d"
+    for size, fits in ((9, True), (10, False)):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=SPARE + 9))
+        if fits:
+            write_zip(path, {"manifest.json": bytes(size)})
+            continue
+        with pytest.raises(StorageError, match=r"a\.ico3d cannot be written, as the disk is full"):
+            write_zip(path, {"manifest.json": bytes(size)})
+    with zipfile.ZipFile(path) as archive:
+        assert archive.read("manifest.json") == bytes(9)

@@ -111,7 +111,7 @@ def test_what_is_no_json_is_told_as_such(tmp_path, content):
 
 
 def test_one_of_many_files_leaves_room_on_the_disk(tmp_path, monkeypatch):
-    path, left = tmp_path / "new" / "000001.png", [SPARE, SPARE - 1]
+    path, left = tmp_path / "new" / "000001.png", [SPARE + 1, SPARE]
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=left.pop(0)))
     write_one_of_many(path, b"1")

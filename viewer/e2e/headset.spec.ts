@@ -247,19 +247,19 @@ describe('a talk by headset', () => {
   });
 
   test('what is said on the page is read below the face, never over it', async () => {
-    const talk = await page.evaluate(() => {
+    const text = () => page.evaluate(() => window.immersion().board.text);
+    await page.evaluate(() => {
       document.getElementById('captions')!.hidden = false;
       document.getElementById('answer')!.innerHTML = '<span>Somewhere in </span><span class="unheard">the stars.</span>';
-      return new Promise<string>((resolve) => setTimeout(() => resolve(window.immersion().board.text)));
     });
+    await drawn(page, 2);
+    const talk = await text();
     expect(talk).toContain('Somewhere in');
     expect(talk).not.toContain('the stars'); // that was not heard yet
     expect(talk).toContain('Hold the trigger to talk.');
-    const both = await page.evaluate(() => {
-      document.getElementById('line')!.textContent = 'This device or the line is too slow just now.';
-      return new Promise<string>((resolve) => setTimeout(() => resolve(window.immersion().board.text)));
-    });
-    expect(both).toMatch(/^This device or the line is too slow just now\.\n[^]*Somewhere in/); // above what she says, not instead of it
+    await page.evaluate(() => void (document.getElementById('line')!.textContent = 'This device or the line is too slow just now.'));
+    await drawn(page, 2);
+    expect(await text()).toMatch(/^This device or the line is too slow just now\.\n[^]*Somewhere in/); // above what she says, not instead of it
     await page.evaluate(() => void (document.getElementById('line')!.textContent = ''));
     for (const height of [0.7, 1.5, 2]) {
       await page.evaluate((y) => void (window.headset.position.y = y), height);
@@ -277,6 +277,37 @@ describe('a talk by headset', () => {
       expect(top!).toBeLessThan(chin!);
     }
     await page.evaluate(() => void (window.headset.position.y = 1.5));
+  });
+
+  test('it is written once a picture, whatever comes, and a long text in part', async () => {
+    const counted = await page.evaluate(async () => {
+      const { prototype } = CanvasRenderingContext2D;
+      const [{ measureText, roundRect }, counts] = [prototype, { measured: 0, written: 0 }];
+      prototype.measureText = function (text) {
+        counts.measured += 1;
+        return measureText.call(this, text);
+      };
+      prototype.roundRect = function (...shape) {
+        counts.written += 1;
+        return roundRect.apply(this, shape);
+      };
+      const { board } = window.immersion();
+      const question = document.getElementById('question')!;
+      const before = question.textContent;
+      question.textContent = 'a '.repeat(8000);
+      for (let i = 0; i < 100; i++) {
+        document.getElementById('state')!.dataset.time = `${i}`;
+        await Promise.resolve(); // the observer is told
+      }
+      const soon = counts.written;
+      while (counts.written === 0) await new Promise((resolve) => setTimeout(resolve, 20));
+      Object.assign(prototype, { measureText, roundRect });
+      question.textContent = before;
+      return { soon, ...counts, letters: board.text.length };
+    });
+    expect(counted.soon).toBe(0);
+    expect(counted.letters).toBeGreaterThan(15_000);
+    expect(counted.measured / counted.written).toBeLessThan(4000); // each word, and each blank, of a part
   });
 
   test('the trigger is the button to talk', async () => {

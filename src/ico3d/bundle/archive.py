@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ico3d.bundle import limits
-from ico3d.common.files import write_atomic
+from ico3d.common.files import check_left, write_atomic
 from ico3d.common.unpacking.zips import OtherEndError, directory
 from ico3d.errors import BundleError
 
@@ -57,15 +57,20 @@ def write_zip(path: Path, files: Mapping[str, bytes]) -> None:
 
     Raises:
         BundleError: If a name or size is not allowed, or no file can be written at the path.
-        StorageError: If the disk is full.
+        StorageError: If the disk has no room for it and some more.
     """
     sizes = {name: len(data) for name, data in files.items()}
     _check_names(list(sizes), path)
     _check_sizes(sizes, path)
+
+    def written(temporary: Path) -> None:
+        check_left(temporary.parent, path, sum(sizes.values()))
+        _write_zip(temporary, files)
+
     try:
         if path.exists() and not path.is_file():
             raise BundleError(f"{path} is a folder or a device: name a file to write.")
-        write_atomic(path, lambda temporary: _write_zip(temporary, files))
+        write_atomic(path, written)
     except OSError as error:
         raise BundleError(f"{path} cannot be written: {error.strerror}.") from error
 

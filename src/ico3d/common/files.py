@@ -77,7 +77,7 @@ def write_one_of_many(path: Path, write: Callable[[Path], None] | bytes) -> None
         StorageError: If less than `SPARE` bytes of the disk are left, or it is full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    check_left(path.parent, path)
+    check_left(path.parent, path, len(write) if isinstance(write, bytes) else 0)
     write_atomic(path, write)
 
 

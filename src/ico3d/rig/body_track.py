@@ -9,7 +9,7 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import write_one_of_many
 from ico3d.common.typed import parse_json
 from ico3d.common.unpacking.heads import SMALL_HEAD, check_head
 from ico3d.errors import CaptureError
@@ -137,10 +137,11 @@ def write_body_track(track: BodyTrack, recording: Path) -> Path:
 
     Raises:
         CaptureError: If the file cannot be written.
+        StorageError: If the disk has no room for it and some more.
     """
     file = track_file(recording)
     try:
-        write_atomic(file, track.to_bytes())
+        write_one_of_many(file, track.to_bytes())
     except OSError as error:
         raise CaptureError(
             f"{file} cannot be written ({error.strerror}): a body track lies with its recording; "

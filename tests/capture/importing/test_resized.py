@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import soundfile
 
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
@@ -147,3 +148,18 @@ def test_points_are_not_written_where_the_disk_is_nearly_full(
     out = tmp_path / "small"
     assert main(["capture", "resize", str(two_sizes), str(out), "--height", "32"]) == 1
     assert "GB left: make room" in capsys.readouterr().err and not out.exists()
+
+
+def test_sound_is_not_written_where_the_disk_is_nearly_full(
+    two_sizes, tmp_path, monkeypatch, capsys
+):
+    """Two hours of silence are 0.4 MB of FLAC and 230 MB of samples."""
+    soundfile.write(two_sizes / "audio.wav", np.zeros(1600, np.float32), 16_000)
+    usage = new_folder.shutil.disk_usage(tmp_path)
+    for free, code in ((3199, 1), (3200, 0)):
+        enough = usage._replace(free=new_folder.SPARE + free)
+        monkeypatch.setattr(new_folder.shutil, "disk_usage", lambda _, enough=enough: enough)
+        out = tmp_path / f"small{free}"
+        assert main(["capture", "resize", str(two_sizes), str(out), "--height", "32"]) == code
+        assert out.exists() == (code == 0)
+    assert "GB left: make room" in capsys.readouterr().err

@@ -9,6 +9,8 @@ const LINE = 54;
 const EDGE = 36;
 const MOST_LINES = Math.floor((HEIGHT - EDGE) / LINE);
 const MOST_TOLD = 3; // lines of a notice: captions have the rest
+/** Letters of a long text after which its lines are made of another part of it; the board shows a third of them. */
+const PART = 1000;
 const WIDE = 0.6; // m, of the board at 1 m
 const UNDER = 0.03; // m at 1 m: between the chin and the board
 const NEARER = 0.75; // of the way from the visitor to the face
@@ -34,7 +36,8 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   private way = ''; // back to who is not seen
   private readonly canvas = document.createElement('canvas');
   private readonly texture: THREE.Texture;
-  private readonly observer = new MutationObserver(() => this.write());
+  private isNew = false; // what the page says, since it was written
+  private readonly observer = new MutationObserver(() => (this.isNew = true));
 
   /** @param page where the captions and notices are */
   constructor(page: ParentNode) {
@@ -68,6 +71,11 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     this.write();
   }
 
+  /** Writes what the page says anew; called for each picture, between which many messages may come. */
+  follow(): void {
+    if (this.isNew) this.write();
+  }
+
   /** Goes below a face: all in world space, m. */
   place(visitor: THREE.Vector3, chin: THREE.Vector3, up: THREE.Vector3): void {
     const sight = chin.clone().sub(visitor).multiplyScalar(NEARER);
@@ -88,12 +96,13 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   }
 
   private write(): void {
+    this.isNew = false;
     const [told, said] = this.read();
     this.text = [...told, ...said].map(({ text, seen }) => text.slice(0, seen)).join('\n');
     const context = this.canvas.getContext('2d')!;
     context.font = `${LETTERS}px system-ui, sans-serif`;
     const width = (text: string) => context.measureText(text).width;
-    const inLines = (texts: Said[]) => texts.flatMap((one) => seenLines(one, linesOf(one.text, WIDTH - 2 * EDGE, width)));
+    const inLines = (texts: Said[]) => texts.map(part).flatMap((one) => seenLines(one, linesOf(one.text, WIDTH - 2 * EDGE, width)));
     const above = inLines(told).slice(0, MOST_TOLD);
     const lines = inLines(said);
     const room = MOST_LINES - above.length;
@@ -135,6 +144,12 @@ function said(element: HTMLElement, own: boolean): Said {
   const unheard = element.querySelector('.unheard')?.textContent ?? '';
   const text = element.textContent ?? '';
   return { text: tidy(text), own, seen: tidy(text.slice(0, text.length - unheard.length)).length };
+}
+
+/** Of a long text the part that is seen: from some letters before the last one that is. */
+function part({ text, own, seen }: Said): Said {
+  const from = PART * Math.max(0, Math.floor(Math.min(seen, text.length) / PART) - 1);
+  return { text: text.slice(from, from + 3 * PART).trim(), own, seen: seen - from };
 }
 
 /** How much of each line of a text is seen. */

@@ -221,6 +221,7 @@ export class Immersion implements Presentation {
     const { isLost } = this.sight;
     const { up } = this.ground;
     this.board.guide(isLost && this.canReturn() ? this.ports.words.text(say('xr.return')) : '');
+    this.board.follow();
     this.board.place(visitor, isLost ? this.before(head) : this.sight.nearest(this.face(CHIN), visitor, up), up);
     this.voice?.place(this.face(MOUTH).applyMatrix4(head.invert()));
   }

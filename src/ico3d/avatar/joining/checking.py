@@ -11,6 +11,7 @@ from ico3d.avatar.joining.face_views import FaceView, face_views
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.region import HeadRegion
+from ico3d.common.files import write_one_of_many
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.device import CPU
@@ -52,7 +53,7 @@ def write_checks(folder: Path, capture: Capture, out: Path, device: torch.device
         marked = _marked(view, moved(where, head.landmarks))
         row = np.hstack([view.image.numpy(), over, marked])
         name = f"{view.frame:06d}_{capture.cameras[view.camera_index].name}.png"
-        _enlarged(row).save(out / name)
+        write_one_of_many(out / name, _enlarged(row).save)
 
 
 def _marked(view: FaceView, points: np.ndarray) -> np.ndarray:

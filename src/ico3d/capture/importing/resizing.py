@@ -90,6 +90,7 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
             save_picture(work / "backgrounds" / f"{camera.name}.png", to_bytes(plate))
     sound = capture.audio()
     if sound is not None:
+        check_room(work, 2 * len(sound.samples))  # 16 bits each
         soundfile.write(work / "audio.wav", sound.samples, sound.rate)
     _write_tracks(capture, work)
     if capture.shows == "head":

@@ -26,7 +26,7 @@ from ico3d.capture.portrait.settings import CUTOUTS, PortraitSettings
 from ico3d.capture.progress import Reached, tracked
 from ico3d.capture.surface.first_points import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
-from ico3d.capture.writing.new_folder import new_folder
+from ico3d.capture.writing.new_folder import check_room, new_folder
 from ico3d.common.spread import spread
 from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
@@ -216,4 +216,5 @@ def _save_sound(work: Path, sound: Sound) -> None:
     """`aud.wav`, 16-bit."""
     import soundfile
 
+    check_room(work, 2 * len(sound.samples))
     soundfile.write(work / "aud.wav", sound.samples, sound.rate, subtype="PCM_16")

@@ -112,7 +112,7 @@ class RemoteMouth:
 
     def _exchange(self, message: bytes | str, is_first: bool, fitting: range) -> np.ndarray:
         line = self._socket or self._connected()
-        with _within(self._settings.timeout, line):
+        with _cutting(line, self._settings.timeout):
             if is_first:
                 line.send(START)
             line.send(message)
@@ -150,14 +150,12 @@ class RemoteMouth:
     def _hang_up(self) -> None:
         line, self._socket = self._socket, None
         if line is not None:
-            # It may wait for an answer.
-            closing = threading.Thread(target=_close, args=(line, self._settings.timeout))
-            closing.daemon = True
-            closing.start()
+            which = line, self._settings.timeout
+            threading.Thread(target=_close, args=which, daemon=True).start()  # it may wait
 
 
 @contextlib.contextmanager
-def _within(seconds: float, line: ClientConnection) -> Generator[None, None, None]:
+def _cutting(line: ClientConnection, seconds: float) -> Generator[None, None, None]:
     """Cuts a line whose other end does not take what is sent: that has no time limit of its own."""
     cut = threading.Timer(seconds, _cut, (line,))
     cut.daemon = True
@@ -170,7 +168,7 @@ def _within(seconds: float, line: ClientConnection) -> Generator[None, None, Non
 
 def _close(line: ClientConnection, seconds: float) -> None:
     """Closes a line, on which an answer to a ping may be stuck: closing would wait for that."""
-    with _within(seconds, line):
+    with _cutting(line, seconds):
         line.close()
 
 

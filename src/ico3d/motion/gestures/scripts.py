@@ -84,7 +84,7 @@ def _both(
 
 
 # Hands of somebody who is seen across a table are before the chest: lower ones would be hidden.
-_ELBOW = (0.15, -0.93, -0.34)
+_ELBOW = (0.28, -0.90, -0.33)
 
 # The elbow is beside the trunk, under the hand: an arm that points at who looks has no bones.
 _WAVE = Reach((0.11, 0.13, 0.34), (0.42, -0.9, -0.4), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
@@ -115,8 +115,8 @@ _THINK = Reach(
     part=1.15,
 )
 
-_RAISED = Reach((0.12, -0.14, 0.45), _ELBOW, (-0.1, 0.45, 1.0), (-0.85, -0.35, 0.1))
-_BEATEN = Reach((0.14, -0.33, 0.52), _ELBOW, (-0.05, 0.05, 1.0), (-0.95, 0.15, 0.0))
+_RAISED = Reach((-0.07, -0.19, 0.37), _ELBOW, (-0.1, 0.45, 1.0), (-0.85, -0.35, 0.1))
+_BEATEN = Reach((0.00, -0.37, 0.40), _ELBOW, (-0.05, 0.05, 1.0), (-0.95, 0.15, 0.0))
 _LOW = Reach((0.06, -0.36, 0.40), _ELBOW, (-0.35, 0.25, 0.9), (-0.75, 0.6, 0.1))
 _SHOWN = Reach((0.20, -0.44, 0.46), _ELBOW, (0.05, 0.05, 1.0), (-0.8, 0.5, 0.1), "offering")
 _INSIDE = Reach((-0.04, -0.24, 0.40), _ELBOW, (-0.6, 0.35, 0.75), (-0.75, -0.1, -0.6))

@@ -96,11 +96,13 @@ export class Captions {
   }
 
   private write(heard: string, next: string): void {
+    // The page would find the place of a question for nothing, of which many may come.
+    if (this.heardWords.textContent === heard && this.nextWords.textContent === next) return;
     this.heardWords.textContent = heard;
     this.nextWords.textContent = next;
     if (this.scrolls) return;
     this.scrolls = true;
-    requestAnimationFrame(() => this.scroll()); // once for all that is written until the next picture
+    queueMicrotask(() => this.scroll()); // once for all that is written until then
   }
 
   /**
