@@ -9,7 +9,7 @@ const LINE = 54;
 const EDGE = 36;
 const MOST_LINES = Math.floor((HEIGHT - EDGE) / LINE);
 const MOST_TOLD = 3; // lines of a notice: captions have the rest
-/** Letters of a long text after which its lines are made of another part of it; the board shows a third of them. */
+/** Letters of a long text after which its lines are made of another part of it; the board has room for some 300. */
 const PART = 1000;
 const WIDE = 0.6; // m, of the board at 1 m
 const UNDER = 0.03; // m at 1 m: between the chin and the board
@@ -146,9 +146,9 @@ function said(element: HTMLElement, own: boolean): Said {
   return { text: tidy(text), own, seen: tidy(text.slice(0, text.length - unheard.length)).length };
 }
 
-/** Of a long text the part that is seen: from some letters before the last one that is. */
+/** Of a long text the part that is seen: from some letters before the last one that was heard, else its beginning. */
 function part({ text, own, seen }: Said): Said {
-  const from = PART * Math.max(0, Math.floor(Math.min(seen, text.length) / PART) - 1);
+  const from = seen <= text.length ? PART * Math.max(0, Math.floor(seen / PART) - 1) : 0;
   return { text: text.slice(from, from + 3 * PART).trim(), own, seen: seen - from };
 }
 

@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 
-const LEAST = 40; // levels of 255, of three colours together, by which a pixel shows the head; its soft edge over a dark collar has fewer
+const LEAST = 24; // levels of 255, of three colours together, by which a pixel shows the head
 
 declare global {
   interface Window {
