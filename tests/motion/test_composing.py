@@ -11,7 +11,7 @@ from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, Word
 from ico3d.motion.composing.composer import Composer
 from ico3d.motion.composing.cues import SETTLE, Cue, Direction, Release, clip_time, weight
-from ico3d.motion.composing.gaze import CHEST_YAW, HEAD_SPEED, HEAD_YAW, Gaze, direction_to
+from ico3d.motion.composing.gaze import CHEST_YAW, FACE_SPEED, HEAD_YAW, Gaze, direction_to
 from ico3d.motion.composing.performer import Performer
 from ico3d.motion.composing.takes import limbs
 from ico3d.motion.living import Living, living
@@ -217,8 +217,19 @@ def test_the_head_turns_first_then_the_chest_within_limits():
     assert reached[0] < reached[1]
     assert np.degrees(chest[-1]) == pytest.approx(24.0, abs=0.2) and chest.max() <= CHEST_YAW + 0.02
     assert np.degrees(head[-1]) == pytest.approx(50.0, abs=0.5) and head.max() <= HEAD_YAW + 0.02
-    assert np.abs(np.diff(head)).max() / 0.02 <= HEAD_SPEED * 1.01
+    assert np.abs(np.diff(chest + head)).max() / 0.02 <= FACE_SPEED * 1.01
     assert np.degrees(2 * twist_angle(turns[-1, 1], down)) == pytest.approx(10.0, abs=1.0)
+
+
+@pytest.mark.parametrize("degrees", [-70.0, 30.0, 57.0, 73.0])
+def test_a_face_does_not_turn_past_the_visitor_while_the_chest_catches_up(degrees: float):
+    gaze, up = Gaze(), np.array([0.0, 1.0, 0.0])
+    gaze.look(math.radians(degrees), 0.0)
+    turns = np.stack([gaze.at(0.02 * i) for i in range(200)])  # (200, 3, 4)
+    face = np.degrees(twist_angle(turns[:, 0], up) + 2 * twist_angle(turns[:, 1], up))
+    assert np.abs(face).max() <= abs(degrees) + 0.3
+    arrived = int(np.argmax(np.abs(face) > 0.97 * abs(degrees)))
+    np.testing.assert_allclose(face[arrived:], degrees, atol=0.03 * abs(degrees))
 
 
 def test_who_goes_behind_is_looked_after_on_the_side_where_they_went():

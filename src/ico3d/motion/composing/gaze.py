@@ -16,10 +16,10 @@ CHEST_YAW = math.radians(24.0)
 """Largest angle in radians by which the chest turns."""
 CHEST_FROM, CHEST_PART = math.radians(15.0), 0.4
 """Angle of the visitor in radians above which the chest turns, and its share of the rest."""
-HEAD_SPEED, CHEST_SPEED = math.radians(140.0), math.radians(45.0)
-"""Largest angular speeds, radians per second."""
-HEAD_STIFF, CHEST_STIFF = 7.0, 3.0
-"""Natural frequencies, in 1/s, with which head and chest follow, critically damped."""
+FACE_SPEED, CHEST_SPEED = math.radians(140.0), math.radians(45.0)
+"""Largest angular speeds of face and chest in space, radians per second."""
+FACE_STIFF, CHEST_STIFF = 7.0, 3.0
+"""Natural frequencies, in 1/s, with which face and chest follow, critically damped."""
 BEHIND = math.radians(120.0)
 """Angle in radians above which a visitor is behind the person.
 
@@ -59,8 +59,8 @@ class Gaze:
         self._steps = 0
         self._yaw, self._pitch = 0.0, 0.0
         self._chest = _Hinge(CHEST_STIFF, CHEST_SPEED)
-        self._head = _Hinge(HEAD_STIFF, HEAD_SPEED)
-        self._nod = _Hinge(HEAD_STIFF, HEAD_SPEED)
+        self._face = _Hinge(FACE_STIFF, FACE_SPEED)
+        self._nod = _Hinge(FACE_STIFF, FACE_SPEED)
 
     def look(self, yaw: float, pitch: float) -> None:
         """Sets the direction of the visitor, see `direction_to`.
@@ -85,24 +85,27 @@ class Gaze:
             self._steps += 1
         left = np.array([0.0, 1.0, 0.0])
         down = np.array([1.0, 0.0, 0.0])
-        half = multiply(about(left, 0.5 * self._head.angle), about(down, 0.5 * self._nod.angle))
+        turned = self._face.angle - self._chest.angle
+        half = multiply(about(left, 0.5 * turned), about(down, 0.5 * self._nod.angle))
         return np.stack([about(left, self._chest.angle), half, half])
 
     def _step(self) -> None:
         beyond = max(abs(self._yaw) - CHEST_FROM, 0.0) * CHEST_PART
         wanted = math.copysign(min(beyond, CHEST_YAW), self._yaw)
         self._chest.step(wanted)
+        # The face, not the neck, follows: it stays on the visitor while the chest catches up.
         rest = self._yaw - self._chest.angle
-        self._head.step(min(max(rest, -HEAD_YAW), HEAD_YAW))
+        self._face.step(self._chest.angle + min(max(rest, -HEAD_YAW), HEAD_YAW))
         self._nod.step(min(max(self._pitch, -HEAD_PITCH), HEAD_PITCH))
 
 
-def direction_to(eyes: Array, visitor: Array) -> tuple[float, float]:
+def direction_to(point: Array, visitor: Array) -> tuple[float, float]:
     """Yaw to the left and pitch downwards, radians, of a visitor as seen by a person facing +z.
 
     Args:
-        eyes: (3,) point between the person's eyes, metres.
+        point: (3,) point at the height of the person's eyes, over the neck about which the face
+            turns, metres.
         visitor: (3,) position of the visitor in the same space, metres.
     """
-    x, y, z = visitor - eyes
+    x, y, z = visitor - point
     return math.atan2(x, z), -math.atan2(y, math.sqrt(x * x + z * z))

@@ -3,6 +3,7 @@ import type { Spoken } from '../../motion/director.ts';
 import { MICROPHONE_RATE, type Cue, type StateMessage } from '../../protocol.ts';
 import type { Vector } from '../../rig/quaternions.ts';
 import type { Rig } from '../../rig/rig.ts';
+import type { Figure } from '../figure.ts';
 import { Living } from '../living.ts';
 import type { RigPose } from '../placement.ts';
 import type { Repertoire } from '../repertoire.ts';
@@ -25,7 +26,7 @@ const MOST_CLOCKS = 100;
  */
 export class BodyLanguage {
   private readonly heard: () => Spoken | null;
-  private readonly eyes: Vector;
+  private readonly pivot: Vector; // at the height of the eyes, over the joint about which the face turns, m in rest space
   private readonly retarget: Retarget;
   private readonly performer: Performer;
   private readonly gaze = new Gaze();
@@ -43,7 +44,7 @@ export class BodyLanguage {
    */
   constructor(rig: Rig, { figure, clips }: Repertoire, seed: number, heard: () => Spoken | null) {
     this.heard = heard;
-    this.eyes = figure.eyes;
+    this.pivot = pivotOf(rig, figure);
     this.retarget = new Retarget(rig, figure);
     this.performer = new Performer(new Living(figure, seed), clips);
     this.attention = new Attention(seed);
@@ -70,7 +71,7 @@ export class BodyLanguage {
 
   /** Sets the position of the visitor, m in rest space. */
   look(visitor: Vector): void {
-    const [yaw, pitch] = directionTo(this.eyes, visitor);
+    const [yaw, pitch] = directionTo(this.pivot, visitor);
     this.gaze.look(yaw, pitch, this.attention.at(this.now));
   }
 
@@ -126,4 +127,10 @@ export class BodyLanguage {
     this.performer.follow([cue, release], this.own);
     return true;
   }
+}
+
+/** The face turns about the neck: seen from the eyes, which come along, whoever is near would stand further aside. */
+function pivotOf({ joints }: Rig, { eyes, parts }: Figure): Vector {
+  const neck = parts.find(({ role }) => role === 'neck') ?? parts.find(({ role }) => role === 'head');
+  return neck ? [eyes[0], eyes[1], joints[neck.joints[0]!]![2]] : eyes;
 }

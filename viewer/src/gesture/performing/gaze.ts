@@ -9,10 +9,10 @@ const HEAD_PITCH = 22 * RADIANS; // largest angle by which neck and head togethe
 const CHEST_YAW = 24 * RADIANS; // largest angle by which the chest turns
 const CHEST_FROM = 15 * RADIANS; // angle of the visitor above which the chest turns, too
 const CHEST_PART = 0.4; // share of the angle beyond CHEST_FROM by which the chest turns
-const HEAD_SPEED = 140 * RADIANS; // largest speed per second
-const CHEST_SPEED = 45 * RADIANS; // largest speed per second
+const FACE_SPEED = 140 * RADIANS; // largest speed in space per second
+const CHEST_SPEED = 45 * RADIANS; // largest speed in space per second
 const TILT_SPEED = 30 * RADIANS; // largest speed per second
-const HEAD_STIFF = 7; // natural frequency with which the head follows, 1/s
+const FACE_STIFF = 7; // natural frequency with which the face follows, 1/s
 const CHEST_STIFF = 3; // natural frequency with which the chest follows, and the head tilts, 1/s
 const BEHIND = 120 * RADIANS; // a visitor beyond this angle is behind: the person stays turned to the side of leaving
 const STRAIGHT: Bearing = { yaw: 0, pitch: 0, tilt: 0 };
@@ -44,8 +44,8 @@ export class Gaze {
   private pitch = 0;
   private tilt = 0;
   private readonly chest = new Hinge(CHEST_STIFF, CHEST_SPEED);
-  private readonly head = new Hinge(HEAD_STIFF, HEAD_SPEED);
-  private readonly nod = new Hinge(HEAD_STIFF, HEAD_SPEED);
+  private readonly face = new Hinge(FACE_STIFF, FACE_SPEED);
+  private readonly nod = new Hinge(FACE_STIFF, FACE_SPEED);
   private readonly lean = new Hinge(CHEST_STIFF, TILT_SPEED);
 
   /**
@@ -64,7 +64,8 @@ export class Gaze {
   /** Local rotations of chest, neck and head at a time, s; times must not descend from call to call. */
   at(time: number): [Quat, Quat, Quat] {
     for (; this.steps * TICK < time - 1e-9; this.steps++) this.step();
-    const half = multiply(about([0, 1, 0], 0.5 * this.head.angle), about([1, 0, 0], 0.5 * this.nod.angle));
+    const turned = this.face.angle - this.chest.angle;
+    const half = multiply(about([0, 1, 0], 0.5 * turned), about([1, 0, 0], 0.5 * this.nod.angle));
     const held = multiply(half, about([0, 0, 1], -0.5 * this.lean.angle)); // about the way that the face looks
     return [about([0, 1, 0], this.chest.angle), held, held];
   }
@@ -72,15 +73,16 @@ export class Gaze {
   private step(): void {
     const beyond = Math.max(Math.abs(this.yaw) - CHEST_FROM, 0) * CHEST_PART;
     this.chest.step(Math.sign(this.yaw) * Math.min(beyond, CHEST_YAW));
-    this.head.step(clamp(this.yaw - this.chest.angle, HEAD_YAW));
+    // The face, not the neck, follows: it stays on the visitor while the chest catches up.
+    this.face.step(this.chest.angle + clamp(this.yaw - this.chest.angle, HEAD_YAW));
     this.nod.step(clamp(this.pitch, HEAD_PITCH));
     this.lean.step(this.tilt);
   }
 }
 
-/** Direction from eyes to a visitor, for a person facing +z: radians to the person's left, and downwards. */
-export function directionTo(eyes: Vector, visitor: Vector): [number, number] {
-  const [x, y, z] = subtract(visitor, eyes);
+/** Direction from a point to a visitor, for a person facing +z: radians to the person's left, and downwards. */
+export function directionTo(point: Vector, visitor: Vector): [number, number] {
+  const [x, y, z] = subtract(visitor, point);
   return [Math.atan2(x, z), -Math.atan2(y, Math.sqrt(x * x + z * z))];
 }
 
