@@ -45,6 +45,14 @@ def test_centres_are_the_documented_formula():
             np.testing.assert_allclose(moved[n, axis], head.means[n, axis] + by, atol=1e-6)
 
 
+def test_the_last_two_displacements_turn_the_eyes():
+    head, e = random_head(5), np.linspace(-1, 1, 39)
+    moved = centres(head, e, (0.1, -0.05)).astype(np.float64)
+    metres = 1.25e-4 * np.array([0.1, -0.05])  # instead of what the network says
+    by = np.einsum("m,mnk->nk", metres, head.displacement_basis.astype(np.float64))
+    np.testing.assert_allclose(moved, head.means + by, atol=1e-7)
+
+
 def test_tracks_are_evaluated_row_by_row():
     head, track = random_head(20), np.random.default_rng(0).normal(size=(6, 39))
     rows = np.stack([coefficients(head, row) for row in track])

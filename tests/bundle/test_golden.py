@@ -54,7 +54,7 @@ def test_an_old_bundle_shows_what_it_showed(name):
         np.testing.assert_allclose(colors, said["rgb"], atol=2e-4)
         np.testing.assert_allclose(opacities, said["opacity"], atol=2e-4)
         where = said.get("centres", head.means)  # Gaussians stood still before version 6
-        np.testing.assert_allclose(centres(head, expression), where, atol=2e-4)
+        np.testing.assert_allclose(centres(head, expression, said.get("gaze")), where, atol=2e-4)
         np.testing.assert_allclose(poses.sum(0), said["poses"], atol=1e-3)
     for index, tensors in enumerate(said.get("windows", ())):
         assert sums(bundle.window(index)) == pytest.approx(tensors, abs=1e-3)

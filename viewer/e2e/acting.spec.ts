@@ -4,6 +4,7 @@ import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { add, rotate, subtract, type Vector } from '../src/rig/quaternions.ts';
 import type { RigPose } from '../src/gesture/placement.ts';
 import { Rig } from '../src/rig/rig.ts';
+import { EYE_UNIT } from '../src/shared.ts';
 import type { Browser } from '../support/browser/browser.ts';
 import { finished, openPage, until } from '../support/browser/talk.ts';
 import { runFork } from '../support/python.ts';
@@ -11,12 +12,14 @@ import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 
 const YAW = 0.5; // rad, as recorded
+const MOST_TURN = 0.2; // rad, of the eyes
 const PLACE: Vector = [0.4, 0, -0.3]; // m
 
 /** How the body and the head were at a moment. */
 interface Sample {
   pose: RigPose;
   head: Vector; // m
+  eyes: number; // radians to the person's left, against the head
 }
 
 declare global {
@@ -37,15 +40,16 @@ beforeAll(async () => {
   server = await ChatServer.start(join(folder, 'person.ico3d'));
   browser = await openPage(server.url);
   page = browser.page;
-  const bones = await page.evaluate(() => {
+  const bones = await page.evaluate((UNIT) => {
     window.samples = [];
     setInterval(() => {
       const { acting, head } = window.ico3d!;
-      window.samples.push({ pose: acting!.pose, head: head!.generator.position.toArray() });
+      const { position, steps } = head!.generator;
+      window.samples.push({ pose: acting!.pose, head: position.toArray(), eyes: steps.at(-2)! / UNIT });
     }, 50);
     const { parents, joints } = window.ico3d!.skinned!.generator.skeleton.rig;
     return { parents, joints };
-  });
+  }, EYE_UNIT);
   rig = new Rig(bones.parents, bones.joints);
   names = await page.evaluate(async () => (await (await fetch('bundle/manifest.json')).json()).skinned.names as string[]);
 });
@@ -132,8 +136,22 @@ describe('a whole person on a skeleton in a conversation', () => {
       const half = (angles: number[]) => angles.findIndex((angle) => (angle - angles[0]!) / (angles.at(-1)! - angles[0]!) > 0.5);
       expect(half(head)).toBeLessThanOrEqual(half(chest));
       expect(half(head)).toBeGreaterThan(0); // it takes its time
+      const eyes = await page.evaluate(() => window.samples.map((sample) => sample.eyes));
+      const first = eyes.findIndex((angle) => angle * Math.sign(aside) > MOST_TURN - 1e-6); // as far as they go
+      expect(first).toBeGreaterThanOrEqual(0);
+      expect(first).toBeLessThan(half(head)); // they lead
     }
     const stay = (await places('left_ankle')).at(-1)!;
     stay.forEach((value, axis) => expect(value).toBeCloseTo(feet[axis]!, 3));
+  });
+
+  test('holds the visitor with its eyes while its head wanders', async () => {
+    await page.evaluate(() => (window.samples.length = 0));
+    await page.waitForFunction(() => window.samples.length > 60);
+    const eyes = await page.evaluate(() => window.samples.map((sample) => sample.eyes));
+    const heads = await yaws('head');
+    const middle = (angles: number[]) => angles.toSorted((a, b) => a - b)[angles.length >> 1]!;
+    const together = heads.map((angle, i) => angle + eyes[i]!);
+    expect(Math.abs(middle(together) + 0.9)).toBeLessThan(0.03); // where the last test left the visitor
   });
 });

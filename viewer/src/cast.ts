@@ -9,6 +9,7 @@ import { readBakedWindow } from './body/window.ts';
 import { GESTURES, SKINNED, SKINNED_REST, type BundleFiles } from './bundle/load.ts';
 import { bodyOf, type AnyBody, type BodyInfo, type HeadInfo, type Manifest, type SkinnedInfo } from './bundle/manifest.ts';
 import { BodyLanguage } from './gesture/performing/body-language.ts';
+import { EyeMovement } from './gesture/performing/eye-movement.ts';
 import { readRepertoire } from './gesture/repertoire.ts';
 import { Head, sway, type Carrier } from './head/head.ts';
 import { MotionDirector, type Spoken } from './motion/director.ts';
@@ -21,6 +22,7 @@ import type { Stage } from './stage/stage.ts';
 export interface Cast {
   backdrop?: Actor;
   head?: Head;
+  eyes?: EyeMovement; // of a head whose eyes turn
   body?: Body; // of windows
   skinned?: SkinnedBody; // or on a skeleton
   acting?: ActingBody; // which gestures as nobody recorded
@@ -67,7 +69,7 @@ async function makePeople(manifest: Manifest, files: BundleFiles, stage: Stage, 
   const { head } = manifest;
   const body = bodyOf(manifest);
   if (head && body) return makePerson(files, manifest, head, body, stage, calm, ports);
-  if (head) return { head: await makeHead(files, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head)) };
+  if (head) return makeHead(files, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head), anySeed());
   const playback = new Playback((body!.frames - 1) / body!.fps, !calm);
   return { playback, ...(await makeBody(files, manifest, playback, stage, ports.failed)) };
 }
@@ -89,11 +91,12 @@ async function makePerson(
   const body = await makeBody(files, manifest, director, stage, ports.failed);
   const { start, end } = animation.rest;
   const resting = rows(calm ? end : start, end);
-  const acting = body.skinned && !calm ? await makeActing(files, body.skinned, manifest, end, stage, ports.heard) : null;
+  const seed = anySeed();
+  const acting = body.skinned && !calm ? await makeActing(files, body.skinned, manifest, end, stage, seed, ports.heard) : null;
   const row = acting ? () => end : () => (body.body ?? body.skinned!).time * info.fps;
-  const head = await makeHead(files, info, stage, resting, row);
-  if (acting) head.motion = () => acting.headMotion();
-  return { head, ...body, director, ...(acting ? { acting } : {}) };
+  const shown = await makeHead(files, info, stage, resting, row, seed);
+  if (acting) shown.head.motion = () => acting.headMotion();
+  return { ...shown, ...body, director, ...(acting ? { acting } : {}) };
 }
 
 /** Makes a body on a skeleton gesture, where the bundle has gestures for it. */
@@ -103,31 +106,47 @@ async function makeActing(
   manifest: Manifest,
   frame: number,
   stage: Stage,
+  seed: number,
   heard: CastPorts['heard'],
 ): Promise<ActingBody | null> {
   const file = await files.gestures();
   if (!file) return null;
   const rig = body.generator.skeleton.rig;
   const repertoire = readRepertoire(file, GESTURES, manifest.skinned!.names.length);
-  const language = new BodyLanguage(rig, repertoire, Math.floor(2 ** 32 * Math.random()), heard);
-  const acting = new ActingBody(body, language, rig, repertoire.figure, frame, () => stage.camera.getWorldPosition(new Vector3()).toArray());
+  const language = new BodyLanguage(rig, repertoire, seed, heard);
+  const acting = new ActingBody(body, language, rig, repertoire.figure, frame, () => visitorOf(stage).toArray());
   stage.add(acting);
   return acting;
 }
 
-/** @param resting the rows of its poses where the head is at rest */
+/**
+ * @param resting the rows of its poses where the head is at rest
+ * @param seed whole number, the same as that of the body's language
+ */
 async function makeHead(
   files: BundleFiles,
   info: HeadInfo,
   stage: Stage,
   resting: readonly number[],
   carrier: Carrier,
-): Promise<Head> {
+  seed: number,
+): Promise<{ head: Head; eyes?: EyeMovement }> {
   const given = await files.head(info);
   const head = new Head(given, carrier);
+  const eyes = info.gaze ? new EyeMovement(info.gaze, () => visitorOf(stage), seed) : undefined;
+  if (eyes) head.eyes = eyes;
   stage.add(head);
   stage.face(given, resting);
-  return head;
+  return { head, eyes };
+}
+
+/** Where the visitor's eyes are, m in the world. */
+function visitorOf({ camera }: Stage): Vector3 {
+  return camera.getWorldPosition(new Vector3());
+}
+
+function anySeed(): number {
+  return Math.floor(2 ** 32 * Math.random());
 }
 
 /** From the first to the last row of a head's poses. */

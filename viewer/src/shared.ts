@@ -4,7 +4,7 @@
 export const BUNDLE_FORMAT = "ico3d-bundle";
 
 /** The newest version of a manifest. */
-export const BUNDLE_VERSION = 6;
+export const BUNDLE_VERSION = 7;
 
 /** The oldest version that is read. */
 export const OLDEST_BUNDLE = 1;
@@ -16,10 +16,13 @@ export const MAX_GAUSSIANS = 1000000;
 export const SPZ = {"ratio": 8, "free": 262144, "degree": 3} as const;
 
 /** What else a bundle may have: a head's counts, a body's frames, files and their bytes. */
-export const MOST = {"rank": 64, "blended": 8388608, "moved": 4194304, "body_rank": 16, "samples_per_frame": 8, "displacements": 16, "hidden": 1024, "expression_size": 512, "num_poses": 100000, "window_frames": 1000, "posed_frames": 30000, "known_poses": 256, "files": 256, "file_bytes": 268435456, "bundle_bytes": 536870912, "manifest_bytes": 1048576} as const;
+export const MOST = {"rank": 64, "blended": 8388608, "moved": 4194304, "body_rank": 16, "samples_per_frame": 8, "displacements": 16, "eye_turn": 0.5, "hidden": 1024, "expression_size": 512, "num_poses": 100000, "window_frames": 1000, "posed_frames": 30000, "known_poses": 256, "files": 256, "file_bytes": 268435456, "bundle_bytes": 536870912, "manifest_bytes": 1048576} as const;
 
 /** Most bytes of files that may be less large than others, by name. */
 export const SMALLER = {"animation.json": 1048576, "body/gestures.safetensors": 4194304, "background.spz": 67108864, "background.ply": 67108864} as const;
+
+/** Metres per radian of a unit of what turns a head's eyes. */
+export const EYE_UNIT = 0.000125;
 
 /** Width of the network of a head's displacements. */
 export const MOVE_HIDDEN = 64;

@@ -235,7 +235,7 @@ export class Visit {
   /** Joins the conversation to who is on stage, and waits until sound may play. */
   private async prepare(
     conversation: Conversation,
-    { head, director, acting }: Presence,
+    { head, eyes, director, acting }: Presence,
     info: HeadInfo,
     moving?: Body | SkinnedBody,
   ): Promise<void> {
@@ -243,6 +243,7 @@ export class Visit {
     conversation.bodyTime = () => moving?.time ?? 0;
     conversation.gestures = director ?? null;
     conversation.acting = acting?.language ?? null;
+    conversation.eyes = eyes ?? null;
     await this.mayTalk(conversation);
     this.ending.signal.throwIfAborted();
   }

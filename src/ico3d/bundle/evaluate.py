@@ -3,7 +3,7 @@
 import numpy as np
 
 from ico3d.bundle.head import BakedHead
-from ico3d.common.expression import LEAKY_SLOPE
+from ico3d.common.expression import EYE_UNIT, LEAKY_SLOPE
 
 
 def coefficients(head: BakedHead, expression: np.ndarray) -> np.ndarray:
@@ -47,10 +47,24 @@ def logits(head: BakedHead, expression: np.ndarray) -> np.ndarray:
     return head.mean_logits.astype(np.float32) + head.basis_scale[:, None] * blend
 
 
-def centres(head: BakedHead, expression: np.ndarray) -> np.ndarray:
-    """Centres (N, 3) float32 for an expression (B,): means + Σ_m d_m(e) · displacement_basis[m]."""
-    moved = np.tensordot(steps(head, expression), head.displacement_basis.astype(np.float32), 1)
-    return head.means + moved  # (N, 3)
+def centres(
+    head: BakedHead, expression: np.ndarray, gaze: tuple[float, float] | None = None
+) -> np.ndarray:
+    """Centres for an expression: means + Σ_m d_m(e) · displacement_basis[m].
+
+    Args:
+        head: The baked head.
+        expression: (B,).
+        gaze: Radians by which its eyes are turned to the person's left, and downwards; None for a
+            head whose eyes do not turn.
+
+    Returns:
+        (N, 3) float32 metres.
+    """
+    moved = steps(head, expression)  # (M,)
+    if gaze is not None:
+        moved[-2:] = EYE_UNIT * np.asarray(gaze, np.float32)
+    return head.means + np.tensordot(moved, head.displacement_basis.astype(np.float32), 1)
 
 
 def attributes(head: BakedHead, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -28,6 +28,8 @@ keeps four numbers of each of these several times over, too. And the sampled tim
 times its clusters and ranks."""
 MAX_HIDDEN = 1024
 MAX_EXPRESSION_SIZE = 512
+MAX_EYE_TURN = 0.5
+"""Radians by which eyes may turn."""
 MAX_POSES = 100_000
 MAX_THUMBNAIL_SIDE = 512
 MAX_NOTES = 10_000

@@ -29,7 +29,7 @@ from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 6
+VERSION = 7
 SINCE = {"body": 2, "skinned": 3}
 """Version in which a field appeared; in older manifests that field is read as null."""
 SINCE_CASTERS = 4
@@ -38,6 +38,8 @@ SINCE_REST = 5
 """Version in which heads and bodies on a skeleton got `num_rest`; older ones are in one file."""
 SINCE_DISPLACEMENTS = 6
 """Version in which heads got `num_displacements`; Gaussians of older ones stand still."""
+SINCE_GAZE = 7
+"""Version in which heads got `gaze`; eyes of older ones do not turn."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
@@ -48,6 +50,22 @@ class FileEntry:
 
     sha256: str
     size: int
+
+
+@dataclass(frozen=True)
+class GazeInfo:
+    """How the eyes of a head turn.
+
+    The last two displacements of its Gaussians turn them, about +y (to the person's left) and about
+    +x (downwards), `ico3d.common.expression.EYE_UNIT` metres per radian and unit.
+
+    Attributes:
+        eyes: Point between the centres of the eyeballs in canonical head space, metres.
+        most: Largest angles to either side, and up or down, radians.
+    """
+
+    eyes: tuple[float, float, float]
+    most: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -69,7 +87,9 @@ class HeadInfo:
         idle_expression: (B,) expression of the neutral face in silence with open eyes.
         num_rest: Number of the Gaussians in `head_rest.safetensors`, the least important ones; 0
             where all are in one file.
-        num_displacements: M, number of ways in which Gaussians move with the expression.
+        num_displacements: M, number of ways in which Gaussians move with the expression, and with
+            the gaze.
+        gaze: How its eyes turn; null where they do not.
     """
 
     num_gaussians: int
@@ -84,6 +104,7 @@ class HeadInfo:
     idle_expression: tuple[float, ...]
     num_rest: int = 0
     num_displacements: int = 0
+    gaze: GazeInfo | None = None
 
 
 @dataclass(frozen=True)
@@ -189,6 +210,8 @@ class Manifest:
             }
         if value["version"] < SINCE_DISPLACEMENTS and isinstance(value.get("head"), dict):
             value |= {"head": {"num_displacements": 0, **value["head"]}}
+        if value["version"] < SINCE_GAZE and isinstance(value.get("head"), dict):
+            value |= {"head": {"gaze": None, **value["head"]}}
         missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
         if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
@@ -270,6 +293,16 @@ def _check_head(head: HeadInfo) -> None:
     eyes = head.eye_offset
     inside = eyes is None or 0 <= eyes <= size - 7
     _require(inside, "head.eye_offset", f"leave room for 7 of the {size} values")
+    if head.gaze is not None:
+        _check_gaze(head.gaze, head.num_displacements)
+
+
+def _check_gaze(gaze: GazeInfo, displacements: int) -> None:
+    turned = all(0 < most <= limits.MAX_EYE_TURN for most in gaze.most)
+    _require(turned, "head.gaze.most", f"lie between 0 and {limits.MAX_EYE_TURN}")
+    near = all(abs(value) <= 1 for value in gaze.eyes)
+    _require(near, "head.gaze.eyes", "lie within a metre of the head")
+    _require(displacements >= 2, "head.num_displacements", "count the two that turn the eyes")
 
 
 def _check_together(head: HeadInfo, body: BodyInfo | SkinnedInfo) -> None:

@@ -30,6 +30,9 @@ TURN_SIZE = 3
 MOST_DISPLACEMENTS = 16
 """Largest number of ways in which a head's Gaussians move with its expression."""
 
+EYE_UNIT = 1.25e-4
+"""Metres per radian of a unit of the displacements that turn a head's eyes."""
+
 MOVE_HIDDEN = 64
 """Width of the network from an expression to how far a head's Gaussians move."""
 

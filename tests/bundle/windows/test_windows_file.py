@@ -267,7 +267,7 @@ def changed(path: str, value) -> bytes:
         ("body.windows.1.file", "../evil", r"windows\[1\].file"),
         ("body.windows.1.more", 1, "unknown key 'more'"),
         ("speech", {"encoder": "", "sha256": "", "fps": 25, "input": "mel"}, "speech"),
-        ("version", 7, "versions 1 to 6"),
+        ("version", 8, "versions 1 to 7"),
     ],
 )
 def test_a_wrong_field_is_named(path, value, message):

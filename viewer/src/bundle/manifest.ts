@@ -23,6 +23,12 @@ export interface StartCamera {
   fov_y: number; // degrees
 }
 
+/** How the eyes of a head turn: by the last two displacements of its Gaussians. */
+export interface GazeInfo {
+  eyes: [number, number, number]; // between the centres of the eyeballs, m in canonical head space
+  most: [number, number]; // radians to either side, and up or down
+}
+
 /** The counts of a head. */
 export interface HeadInfo {
   num_gaussians: number;
@@ -36,7 +42,8 @@ export interface HeadInfo {
   num_poses: number;
   idle_expression: number[];
   num_rest: number; // of the Gaussians, in a file of their own
-  num_displacements: number; // ways in which Gaussians move with the expression
+  num_displacements: number; // ways in which Gaussians move with the expression, and with the gaze
+  gaze: GazeInfo | null; // null where eyes do not turn
 }
 
 /** A span of the body's frames, both ends inside, with Gaussians of its own. */
@@ -136,7 +143,7 @@ export function isSynthetic({ kind }: { kind: string }): boolean {
 }
 
 function withHeadDefaults(info: HeadInfo): HeadInfo {
-  return { ...info, num_rest: info.num_rest ?? 0, num_displacements: info.num_displacements ?? 0 };
+  return { ...info, num_rest: info.num_rest ?? 0, num_displacements: info.num_displacements ?? 0, gaze: info.gaze ?? null };
 }
 
 function withDefaults(info: SkinnedInfo): SkinnedInfo {
@@ -158,6 +165,13 @@ function checkHead(head: HeadInfo): void {
   if (head.num_displacements !== 0 && !isCount(head.num_displacements, MOST.displacements)) bad('head.num_displacements');
   if (head.num_gaussians * (head.rank + head.num_displacements) > MOST.blended) bad('head.rank');
   if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
+  if (head.gaze) checkGaze(head.gaze, head.num_displacements);
+}
+
+function checkGaze({ eyes, most }: GazeInfo, displacements: number): void {
+  if (!isNumbers(eyes, 3) || eyes.some((value) => Math.abs(value) > 1)) bad('head.gaze.eyes');
+  if (!isNumbers(most, 2) || most.some((value) => value <= 0 || value > MOST.eye_turn)) bad('head.gaze.most');
+  if (displacements < 2) bad('head.num_displacements');
 }
 
 function checkBody(body: BodyInfo): void {

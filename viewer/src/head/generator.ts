@@ -1,5 +1,6 @@
 import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
 import { GrowingGenerator } from '../gaussians/growing.ts';
+import { EYE_UNIT } from '../shared.ts';
 import { coefficients } from './coefficients.ts';
 import { MOTION_SIZE, STILL } from './shoulders.ts';
 import { SoftHead, type ShownRows } from './soft.ts';
@@ -19,6 +20,7 @@ export class HeadGenerator extends GrowingGenerator {
   private readonly network: BakedHead['network'];
   private readonly moving: BakedHead['moving'];
   private readonly share: Uint8Array;
+  private eyes: [number, number] | null = null; // as they are turned
 
   /**
    * @param capacity number of all its Gaussians, of which `head` may have the first only
@@ -56,6 +58,14 @@ export class HeadGenerator extends GrowingGenerator {
   express(expression: Float32Array): void {
     coefficients(this.network, expression, this.shown);
     coefficients(this.moving, expression, this.steps);
+    if (this.eyes) this.look(...this.eyes);
+    this.changed();
+  }
+
+  /** Turns the eyes, of a head whose last two displacements do so: radians to the person's left, and downwards. */
+  look(yaw: number, pitch: number): void {
+    this.eyes = [yaw, pitch];
+    this.steps.set([EYE_UNIT * yaw, EYE_UNIT * pitch], this.steps.length - 2);
     this.changed();
   }
 }

@@ -15,6 +15,12 @@ export interface Director {
   expression(out: Float32Array): boolean;
 }
 
+/** Turns a head's eyes. */
+export interface Looker {
+  /** Radians to the person's left, and downwards, `step` seconds later in a head that is placed so; null if as before. */
+  turn(step: number, placed: Pick<Object3D, 'position' | 'quaternion'>): readonly [number, number] | null;
+}
+
 /** Says, `step` seconds after it was asked last, at which row of its poses a head is. */
 export type Carrier = (step: number) => number;
 
@@ -33,6 +39,8 @@ export class Head implements Actor {
   readonly objects: HeadGenerator[];
   readonly expression: Float32Array;
   director: Director | null = null;
+  /** Where its eyes look; null where they do not turn. */
+  eyes: Looker | null = null;
   /** What moves it on from its row; null where its rows say all. */
   motion: (() => RigidMotion) | null = null;
   row = NaN; // of the poses, as shown
@@ -84,9 +92,11 @@ export class Head implements Actor {
     if (moved) this.place(row);
     const changed = this.director?.expression(this.expression) ?? false;
     if (changed) this.generator.express(this.expression);
+    const looked = this.eyes?.turn(step, this.generator) ?? null;
+    if (looked) this.generator.look(...looked);
     const grown = this.growth.advance(step);
     if (grown !== null) this.generator.grow(grown);
-    return changed || moved || grown !== null;
+    return changed || moved || looked !== null || grown !== null;
   }
 }
 

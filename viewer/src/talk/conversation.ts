@@ -69,6 +69,7 @@ export class Conversation {
   bodyTime: () => number = () => 0;
   gestures: Gestures | null = null;
   acting: Acting | null = null;
+  eyes: Pick<Acting, 'attend'> | null = null;
   private readonly view: ConversationView;
   private readonly emit: Emit;
   private readonly speaking: Speaking;
@@ -304,11 +305,13 @@ export class Conversation {
     this.speaking.stop();
     this.gestures?.reset();
     this.acting?.reset();
+    this.eyes?.attend('idle');
   }
 
   private show(state: StateMessage['state']): void {
     this.state = state;
     this.acting?.attend(state);
+    this.eyes?.attend(state);
     this.view.state(state);
     this.settleWake();
   }

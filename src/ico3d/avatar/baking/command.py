@@ -147,7 +147,8 @@ class Bake:
             _save_picture(head_cost.strip(result.head, views), self.strip)
         if not self.force:
             head_bundle.check(result)
-        head_bundle.write(self._out, result, samples, head, capture, about)
+        manifest = head_bundle.write(self._out, result, samples, head, capture, about)
+        report(head_bundle.eyes_in_words(manifest))
 
     def _bake_body(self, body: "TrainedBody", report: Report) -> None:
         from ico3d.avatar.baking import body_bundle
@@ -193,7 +194,9 @@ class Bake:
             check()
             person_bundle.check(result)
             animation = _played(animation, report)
-        person_bundle.write(self._out, avatar, result, animation, body_capture, about)
+        to = self._out
+        manifest = person_bundle.write(to, avatar, result, animation, body_capture, about)
+        report(head_bundle.eyes_in_words(manifest))
 
     def _capture(self, index: int) -> "Capture | None":
         """Opens capture `index` of `files`, the last of which is the bundle; None if not given."""

@@ -9,6 +9,7 @@ import torch
 
 from ico3d.avatar import staging
 from ico3d.avatar.baking import head_cost
+from ico3d.avatar.baking.eyeballs import with_turning_eyes
 from ico3d.avatar.baking.samples import Samples
 from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.baking.telling.about import About
@@ -16,6 +17,7 @@ from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.head import SHOULDERS, BakedHead, BakedShoulders, poses_to_bytes
 from ico3d.bundle.manifest import (
+    GazeInfo,
     HeadInfo,
     Loss,
     Manifest,
@@ -152,7 +154,7 @@ def write(
     poses = motion.poses
     frontal = staging.frontal_camera(capture)
     idle = idle_expression(head, samples.expressions)
-    baked = driven(result.head, head)
+    baked, gaze = finished(result.head, head, idle, np.eye(4))
     seen = baked_gaussians(baked, idle)
     middle = poses[len(poses) // 2]
     points = seen.means[seen.opacities > 0.1].numpy() @ middle[:3, :3].T + middle[:3, 3]  # (P, 3)
@@ -172,7 +174,7 @@ def write(
         files[LICENSES] = about.notices.encode()
     manifest = Manifest(
         name=about.name,
-        head=head_info(baked, head, idle, capture.fps, len(poses)),
+        head=head_info(baked, head, idle, capture.fps, len(poses), gaze),
         body=None,
         speech=speech,
         camera=camera,
@@ -237,6 +239,31 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
     )
 
 
+def finished(
+    baked: BakedHead, head: TrainedHead, idle: np.ndarray, placed: np.ndarray
+) -> tuple[BakedHead, GazeInfo | None]:
+    """A baked head as bundles have it: `driven`, and with eyes that turn where they are found.
+
+    Args:
+        baked: Takes expressions as they were recorded.
+        head: The exact head.
+        idle: (B,) expression at rest.
+        placed: (4, 4) similarity from the space of the exact head to that of the baked one.
+    """
+    marks = head.landmarks
+    if marks is not None:
+        marks = marks @ placed[:3, :3].T + placed[:3, 3]  # (68, 3)
+    return with_turning_eyes(driven(baked, head), idle, marks)
+
+
+def eyes_in_words(manifest: Manifest) -> str:
+    """Whether the eyes of a bundle's head turn."""
+    if manifest.head is not None and manifest.head.gaze is not None:
+        sides, up = np.degrees(manifest.head.gaze.most)
+        return f"its eyes turn, up to {sides:.0f}° to the side and {up:.0f}° up or down."
+    return "its eyes look where the head does: no eyeballs were found behind the lids' landmarks."
+
+
 def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
     """Content of `speech.onnx`, and the manifest's entry about it.
 
@@ -253,7 +280,12 @@ def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, Speec
 
 
 def head_info(
-    baked: BakedHead, head: TrainedHead, idle: np.ndarray, fps: float, num_poses: int
+    baked: BakedHead,
+    head: TrainedHead,
+    idle: np.ndarray,
+    fps: float,
+    num_poses: int,
+    gaze: GazeInfo | None,
 ) -> HeadInfo:
     """The manifest's entry about a head.
 
@@ -263,6 +295,7 @@ def head_info(
         idle: (B,) expression at rest.
         fps: Head poses per second.
         num_poses: Number of head poses.
+        gaze: How its eyes turn, if they do.
     """
     speech = head.adaptor is not None
     return HeadInfo(
@@ -277,4 +310,5 @@ def head_info(
         num_poses=num_poses,
         idle_expression=tuple(round(float(value), 6) for value in idle),
         num_displacements=baked.num_displacements,
+        gaze=gaze,
     )

@@ -253,7 +253,9 @@ def write(
         BundleError: If the animation belongs to another body, or the bundle fails a check.
     """
     head = avatar.head
-    person = replace(result.person, head=head_bundle.driven(result.person.head, head))
+    placed = avatar.placement.canonical_from_head
+    finished, gaze = head_bundle.finished(result.person.head, head, result.idle, placed)
+    person = replace(result.person, head=finished)
     start = person.gaussians(animation.rest.start / avatar.fps, result.idle)
     animation.check_body(result.body.entry)
     camera = standing_camera(avatar, person, capture)
@@ -272,7 +274,7 @@ def write(
     poses = len(person.world_from_head)
     manifest = Manifest(
         name=about.name,
-        head=head_bundle.head_info(person.head, head, result.idle, avatar.fps, poses),
+        head=head_bundle.head_info(person.head, head, result.idle, avatar.fps, poses, gaze),
         **result.body.entries,
         speech=speech,
         camera=camera,

@@ -9,6 +9,7 @@ import torch
 
 from ico3d.avatar import staging
 from ico3d.avatar.baked_body import SkinnedBody
+from ico3d.avatar.baking.eyeballs import with_still_eyes, with_turning_eyes
 from ico3d.avatar.baking.person_bundle import moved_head
 from ico3d.avatar.embodying.builds.change import change_to
 from ico3d.avatar.embodying.builds.names import MEDIUM
@@ -70,8 +71,8 @@ def embody(
     faces = _landmarks(head, given), _landmarks(body, own)
     matrix, rest = canonical_from_head(faces[1], faces[0])
     report(fit_in_words(matrix, rest))
-    placed = moved_head(given, matrix)
-    face, before = Face.of(moved(matrix, faces[0])), Face.of(faces[1])
+    placed, marks = moved_head(_with_still_eyes(head, given), matrix), moved(matrix, faces[0])
+    face, before = Face.of(marks), Face.of(faces[1])
     shown = _cropped(placed, face)
     there = SkinnedBody(skinned).window_gaussians(0, 0.0)
     there = there.transform(np.linalg.inv(poses[0].astype(np.float64)))  # in head space
@@ -86,7 +87,7 @@ def embody(
     report(_gains_in_words(skin, hair))
     clothed = dressed(skinned, roles, surfaces, look.outfit)
     tinted = _tinted(clothed, surfaces, skin, hair).chosen(np.flatnonzero(kept))
-    return _written(out, head, body, shown, reshaped(tinted, look.build), look)
+    return _written(out, head, body, (shown, marks), reshaped(tinted, look.build), look)
 
 
 def body_in(bundle: Bundle, look: Look = UNCHANGED) -> BakedSkinned:
@@ -124,6 +125,12 @@ def _idle(bundle: Bundle, head: BakedHead) -> Gaussians:
     """A head with the face of the bundle's at rest."""
     assert bundle.manifest.head is not None
     return baked_gaussians(head, np.array(bundle.manifest.head.idle_expression, np.float32))
+
+
+def _with_still_eyes(bundle: Bundle, head: BakedHead) -> BakedHead:
+    """The bundle's head without what turns its eyes, which is about the axes of its own space."""
+    assert bundle.manifest.head is not None
+    return head if bundle.manifest.head.gaze is None else with_still_eyes(head)
 
 
 def _cropped(head: BakedHead, face: Face) -> BakedHead:
@@ -183,12 +190,19 @@ def _gains_in_words(skin: np.ndarray, hair: np.ndarray) -> str:
 
 
 def _written(
-    out: Path, head: Bundle, body: Bundle, shown: BakedHead, tinted: BakedSkinned, look: Look
+    out: Path,
+    head: Bundle,
+    body: Bundle,
+    placed: tuple[BakedHead, np.ndarray],
+    tinted: BakedSkinned,
+    look: Look,
 ) -> Manifest:
-    """Writes the person."""
+    """Writes the person, whose head is given with its landmarks (68, 3) where it is placed."""
     about, moving = head.manifest, body.manifest
     assert about.head is not None and moving.head is not None
     _, poses = body.require_head()
+    idle = np.array(about.head.idle_expression, np.float32)
+    shown, gaze = with_turning_eyes(placed[0], idle, placed[1])
     person = BakedAvatar(shown, SkinnedBody(tinted), poses)
     first = person.gaussians(0.0, about.head.idle_expression)
     files = (
@@ -214,6 +228,8 @@ def _written(
         num_rest=0,
         fps=moving.head.fps,
         num_poses=len(poses),
+        num_displacements=shown.num_displacements,
+        gaze=gaze,
     )
     manifest = Manifest(
         name=about.name,

@@ -11,7 +11,14 @@ from ico3d.bundle import animation, backdrop, limits, manifest
 from ico3d.bundle.skinned.gestures import GESTURES
 from ico3d.chat.observing.timing import PARTS
 from ico3d.chat.wire.protocol_visits import MAX_NOTE, MAX_NOTES
-from ico3d.common.expression import EYE_NAMES, LEAKY_SLOPE, LIDS, MOST_DISPLACEMENTS, MOVE_HIDDEN
+from ico3d.common.expression import (
+    EYE_NAMES,
+    EYE_UNIT,
+    LEAKY_SLOPE,
+    LIDS,
+    MOST_DISPLACEMENTS,
+    MOVE_HIDDEN,
+)
 from ico3d.common.spz import container
 from ico3d.motion import clip, roles
 from ico3d.rig import shadow_map
@@ -46,6 +53,7 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             "body_rank": limits.MAX_BODY_RANK,
             "samples_per_frame": limits.MAX_SAMPLES_PER_FRAME,
             "displacements": MOST_DISPLACEMENTS,
+            "eye_turn": limits.MAX_EYE_TURN,
             "hidden": limits.MAX_HIDDEN,
             "expression_size": limits.MAX_EXPRESSION_SIZE,
             "num_poses": limits.MAX_POSES,
@@ -67,6 +75,7 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             **dict.fromkeys(backdrop.BACKGROUNDS, limits.MAX_BACKGROUND_BYTES),
         },
     ),
+    ("EYE_UNIT", "Metres per radian of a unit of what turns a head's eyes.", EYE_UNIT),
     ("MOVE_HIDDEN", "Width of the network of a head's displacements.", MOVE_HIDDEN),
     ("MAX_SHAPES", "Residual shapes of a body on a skeleton.", limits.MAX_SHAPES),
     ("MAX_JOINTS", "Of a body's skeleton; rig/rig.py.", MOST_JOINTS),

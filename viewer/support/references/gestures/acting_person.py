@@ -17,6 +17,7 @@ from ico3d.avatar.baking.persona import load_persona
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.bundle.format import ANIMATION, write_bundle
 from ico3d.bundle.head import POSES, poses_to_bytes
+from ico3d.bundle.manifest import GazeInfo
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED
@@ -33,6 +34,8 @@ YAW = 0.5
 """Radians by which the person was turned to its left when recorded."""
 PLACE = np.array([0.4, 0.0, -0.3])
 """Metres from the origin."""
+GAZE = GazeInfo((0.0, 0.03, 0.06), (0.2, 0.1))
+"""The two displacements of a random head are its eyes'."""
 PERSONA = Path(__file__).parents[1] / "persona.json"
 
 
@@ -60,7 +63,7 @@ def main() -> None:
     manifest = replace(
         skinned_manifest(body),
         persona=load_persona(PERSONA),
-        head=replace(about.head, fps=FPS, num_poses=frames),
+        head=replace(about.head, fps=FPS, num_poses=frames, gaze=GAZE),
         speech=about.speech,
     )
     animation = Animation(FPS, frames, Rest(0, 2), (Action(24, 0.9),))
