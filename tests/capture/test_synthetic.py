@@ -1,6 +1,7 @@
 """Damaged synthetic captures, as `bench/fuzz` found them: one sentence each."""
 
 import json
+import os
 import struct
 import zlib
 
@@ -80,6 +81,9 @@ def test_a_picture_that_claims_to_be_huge_is_refused_undecoded(folder):
 def test_half_a_sample_is_no_sound(folder):
     file = folder / "audio.wav"
     file.write_bytes(file.read_bytes()[:-1])
+    fails(lambda: open_capture(folder).audio(), "audio.wav", "damaged")
+    file.unlink()
+    os.mkfifo(file)  # whoever opens it waits
     fails(lambda: open_capture(folder).audio(), "audio.wav", "damaged")
 
 

@@ -1,5 +1,6 @@
 """Disks that are full and GPUs that fail: one sentence, and the run resumes exactly."""
 
+import shutil
 import tracemalloc
 
 import pytest
@@ -7,8 +8,15 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save
 
+from ico3d.common.files import SPARE
 from ico3d.errors import DeviceError, StorageError
-from ico3d.training.checkpoint import DTYPES, load_tensors, save_tensors, size_of_tensors
+from ico3d.training.checkpoint import (
+    DTYPES,
+    load_tensors,
+    save_sealed,
+    save_tensors,
+    size_of_tensors,
+)
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 from support.full_disk import files_of_at_most
@@ -28,6 +36,18 @@ class Broad(Walk):
         assert tensors.pop("wide").max() == state["calls"]
         assert tensors.pop("other").max() == 2 * state["calls"]
         super().restore(tensors, state)
+
+
+def test_a_model_of_whomever_leaves_room_on_the_disk(tmp_path, monkeypatch):
+    usage, path = shutil.disk_usage(tmp_path), tmp_path / "model.safetensors"
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=SPARE + 400))
+    for save_one in (save_tensors, save_sealed):
+        save_one(path, {"a": torch.zeros(100)}, {})
+        with pytest.raises(StorageError, match=r"model\.safetensors cannot be written") as told:
+            save_one(path, {"a": torch.zeros(101)}, {})
+        assert told.value.code == "disk-full"
+        assert load_tensors(path)[0]["a"].shape == (100,)
+        assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
 def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):

@@ -15,6 +15,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
+from ico3d.common.files import full_disk
 from ico3d.head.portrait.neck import bent
 from ico3d.splat import harmonics
 from ico3d.splat.files.formats import read_gaussians
@@ -143,12 +144,14 @@ def backdrop_gaussians(bundle: Bundle) -> Gaussians | None:
 
     Raises:
         GaussianFileError: If the file of splats is damaged.
+        StorageError: If temporary files have no room for it.
     """
     if bundle.background is None:
         return None
     with TemporaryDirectory() as folder:
         file = Path(folder) / bundle.background
-        file.write_bytes(bundle.read(bundle.background))
+        with full_disk(file):
+            file.write_bytes(bundle.read(bundle.background))
         found = read_gaussians(file).with_degree(0).to_gaussians()
     assert found.sh is not None
     colors = (found.sh[:, 0] * harmonics.C0 + 0.5).clamp(min=0)  # (N, 3)

@@ -105,6 +105,7 @@ class SyntheticCapture(RecordedCapture):
         """
         file = self.path / "audio.wav"
         try:
+            check_regular(file)
             with file.open("rb") as content, open_wav(content) as sound:
                 if sound.getnchannels() != 1 or sound.getsampwidth() != 2:
                     raise CaptureError(f"the sound {file} is not mono with 16 bits.")

@@ -12,7 +12,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import check_left, write_atomic
 from ico3d.common.typed import loose_json
 from ico3d.common.unpacking.heads import check_head
 from ico3d.common.unpacking.memory import lacks_room
@@ -68,8 +68,9 @@ def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None
     The tensors go to the disk one by one: beside them, memory holds at most a copy of one of them.
 
     Raises:
-        StorageError: If the disk is full; a file that was there before is kept.
+        StorageError: If the disk is full, or would nearly be; a file that was there before is kept.
     """
+    check_left(path.parent, path, size_of_tensors(tensors))
     write_atomic(path, lambda temporary: _stream(temporary, tensors, {}, state))
 
 
@@ -85,7 +86,7 @@ def save_sealed(
         before: Name that a file which was there before gets; None replaces it.
 
     Raises:
-        StorageError: If the disk is full; a file that was there before is kept.
+        StorageError: If the disk is full, or would nearly be; a file that was there before is kept.
     """
 
     def write(temporary: Path) -> None:
@@ -95,6 +96,7 @@ def save_sealed(
             file.seek(8 + len(_SEALED))
             file.write(found)
 
+    check_left(path.parent, path, size_of_tensors(tensors))
     write_atomic(path, write, before)
 
 

@@ -143,17 +143,31 @@ def test_machines_do_not_use_up_each_others_share():
 
 def test_who_used_nothing_lately_is_forgotten(monkeypatch):
     monkeypatch.setattr(crowds, "REMEMBERED", 3)
-    now = 0.0
-    meters = Meters(1.0, 1.0, lambda: now)
-    assert all(meters.take(f"10.0.0.{number}") for number in (1, 2))
-    now = 0.5
-    assert meters.take("10.0.0.3")
-    now = 1.2
-    assert meters.take("10.0.0.4")  # of more than three, those that are full again go
-    assert not meters.take("10.0.0.3") and len(meters._buckets) == 2
+    meters = Meters(1.0, 1.0, lambda: 0.0)
+    assert all(meters.take(f"10.0.0.{number}") for number in (1, 2, 3))
+    assert not meters.take("10.0.0.1")  # and was the last to come
+    assert meters.take("10.0.0.4")
+    assert [meters.take(f"10.0.0.{number}") for number in (1, 3, 4)] == [False] * 3
+    assert meters.take("10.0.0.2")
     for number in range(9):
         meters.take(f"10.0.1.{number}")
     assert len(meters._buckets) == 3
+
+
+def test_thousands_of_networks_make_none_dearer():
+    asked = []
+
+    def now():
+        asked.append(1)
+        return 0.0
+
+    meters = Meters(0.0, 2.0, now)  # nobody's bucket is ever full again
+    for number in range(crowds.REMEMBERED + 10):
+        meters.take(f"2001:db8:{number:x}::/64")
+    asked.clear()
+    for number in range(100):
+        meters.take(f"2001:db9:{number:x}::/64")
+    assert len(asked) <= 200  # as a bucket is made, and taken from
 
 
 def has_half(held):

@@ -1,5 +1,7 @@
 """Heads of safetensors files that would take much memory."""
 
+import os
+
 import numpy as np
 import pytest
 from safetensors.numpy import save_file
@@ -13,6 +15,17 @@ def test_heads_of_models_are_taken(tmp_path):
     save_file({f"t{n}": np.zeros(3, np.float32) for n in range(50)}, tmp_path / "a.safetensors")
     check_head(tmp_path / "a.safetensors")
     assert len(load_bounded((tmp_path / "a.safetensors").read_bytes())) == 50
+
+
+def test_a_file_that_is_a_hole_is_refused(tmp_path):
+    path = tmp_path / "hole.safetensors"
+    save_file({"a": np.zeros(1, np.float32)}, path)
+    stored = 512 * path.stat().st_blocks
+    os.truncate(path, heads.MOST_RATIO * stored + heads.FREE)
+    check_head(path)
+    os.truncate(path, heads.MOST_RATIO * stored + heads.FREE + 1)
+    with pytest.raises(ValueError, match=r"it claims \d+ times what the disk stores of it"):
+        check_head(path)
 
 
 def test_a_head_of_many_tensors_or_without_an_end_is_refused(tmp_path):

@@ -34,6 +34,17 @@ describe('marks on a letter', () => {
     expect(broken).not.toMatch(/\u200b\p{M}/u);
   });
 
+  test.each(['α', '\u1100', '\u07da\u20dd', 'aé'])('words that are nearly long cost no more than others: %j', (letters) => {
+    const seconds = (text: string) => {
+      const begun = performance.now();
+      for (let i = 0; i < 40; i++) calm(text);
+      return (performance.now() - begun) / 1000;
+    };
+    const [long, short] = [99, 9].map((length) => `${letters.repeat(Math.floor(length / letters.length))} `.repeat(400).slice(0, 4000));
+    const [first, second] = [0, 1].map(() => seconds(long!) / Math.max(seconds(short!), 0.001));
+    expect(Math.min(first!, second!)).toBeLessThan(3); // as long as each letter was looked at a hundred times, nine
+  });
+
   test('a text is no longer than is laid out at once, and one within an error is short', () => {
     expect(calm('漢'.repeat(16_000))).toBe(`${'漢'.repeat(4000)}…`);
     expect(brief('a short one')).toBe('a short one');

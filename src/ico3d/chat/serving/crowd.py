@@ -2,7 +2,7 @@
 
 import contextlib
 import ipaddress
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -15,7 +15,7 @@ MOST_REQUESTS = 128
 GONE = "ico3d.gone"
 """Name of the future in a WebSocket's scope that is done once its connection is lost: what the
 server has closed waits for its client's answer, and takes as much memory meanwhile."""
-REMEMBERED = 4096  # machines whose use is counted
+REMEMBERED = 4096  # machines whose use is counted; of more, that of those who came last
 UNKNOWN = "unknown"
 """All machines for which a proxy states something that is no address."""
 OWN_NETWORK = 64  # bits of an IPv6 address that tell one household from another
@@ -60,7 +60,7 @@ class Meters:
             now: Returns the time in seconds.
         """
         self._make = lambda: Bucket(rate, burst, now)
-        self._buckets: dict[str, Bucket] = {}  # the one used last is the last
+        self._buckets: OrderedDict[str, Bucket] = OrderedDict()  # the one used last is the last
 
     def of(self, machine: str) -> tuple[Bucket, ...]:
         """The bucket of a machine; none for what `machine_of` does not know."""
@@ -69,9 +69,7 @@ class Meters:
         bucket = self._buckets.pop(machine, None) or self._make()
         self._buckets[machine] = bucket
         if len(self._buckets) > REMEMBERED:
-            full = [name for name, bucket in self._buckets.items() if bucket.is_full]
-            for name in full[:-1] or list(self._buckets)[:1]:
-                del self._buckets[name]
+            self._buckets.popitem(last=False)  # in no time, however many machines come
         return (bucket,)
 
     def take(self, machine: str) -> bool:

@@ -27,6 +27,7 @@ from ico3d.chat.serving.missing import tell_missing
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.network.handshakes import behind_tls
 from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
+from ico3d.chat.serving.network.reach import as_seen
 from ico3d.chat.serving.network.websocket import BoundedWebSocket
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.refusals import Refusals
@@ -225,6 +226,6 @@ def make_server(
         server_header=False,
         http=behind_tls(certificate) if certificate else PromptProtocol,
         proxy_headers=bool(proxies),
-        forwarded_allow_ips=list(proxies),
+        forwarded_allow_ips=as_seen(proxies),
     )
     return PatientServer(config, sessions)

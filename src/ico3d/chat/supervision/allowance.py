@@ -34,11 +34,6 @@ class Bucket:
         self.has(amount)  # brings the level up to date
         self._level = max(0.0, self._level - amount)
 
-    @property
-    def is_full(self) -> bool:
-        """Whether nothing is missing."""
-        return self.has(self._burst)
-
 
 class Allowance(BaseObserver):
     """Counts the requests to the language model that a visitor causes.

@@ -1,5 +1,6 @@
 """Bounds the heads of safetensors files, which anybody may have written."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,9 @@ from safetensors.numpy import load
 MOST_HEAD, MOST_TENSORS = 16 << 20, 10_000
 """Bytes of what a file says of its tensors and of itself, and how many tensors it may have, fewer
 if the latter has brackets: for each more than a kilobyte of memory is taken."""
+MOST_RATIO, FREE = 8, 1 << 20
+"""So many times what a disk stores of it may a file take, and so many bytes more: a mapped hole
+becomes memory, which of a temporary file system stays taken when the program has ended."""
 SMALL_HEAD = 1 << 20
 """Bytes of a head that is parsed here: what it says becomes thirty times as much."""
 
@@ -21,13 +25,22 @@ def check_head(path: Path, most: int = MOST_HEAD) -> bytes:
 
     Raises:
         OSError: If the file cannot be read.
-        ValueError: If the head is longer, or names more than `MOST_TENSORS`.
+        ValueError: If the head is longer, or names more than `MOST_TENSORS`, or the file is but a
+            hole.
     """
     with path.open("rb") as file:
+        _check_stored(os.fstat(file.fileno()))
         size = int.from_bytes(file.read(8), "little")
         head = file.read(min(size, most))
     _check(size, head, most)
     return head
+
+
+def _check_stored(about: os.stat_result) -> None:
+    stored = 512 * getattr(about, "st_blocks", 0)  # 0 where a system does not tell
+    if stored and about.st_size > MOST_RATIO * stored + FREE:
+        times = about.st_size // stored
+        raise ValueError(f"it claims {times} times what the disk stores of it")
 
 
 def bounded_head(content: bytes, most: int = SMALL_HEAD) -> bytes:

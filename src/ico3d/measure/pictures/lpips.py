@@ -17,6 +17,7 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
 
+from ico3d.common.unpacking.heads import check_head
 from ico3d.common.weights import model_file
 from ico3d.errors import MissingModelError, ModelError
 from ico3d.head.perceptual import DEVIATION, MEAN, vgg_layers
@@ -73,12 +74,14 @@ class Lpips(nn.Module):
         paths = [model_file(name, "LPIPS") for name in (files.features, files.linear)]
         self._taps = files.taps
         self.features = vgg_layers(VGG_CHANNELS) if network == "vgg" else _alexnet_layers()
-        tensors, linear = map(load_file, paths)
         try:
+            for path in paths:
+                check_head(path)
+            tensors, linear = map(load_file, paths)
             names = self.features.state_dict(prefix="features.")
             self.load_state_dict({name: tensors[name] for name in names})
             weights = [linear[f"lin{k}.model.1.weight"].flatten() for k in range(len(files.taps))]
-        except (KeyError, RuntimeError) as error:
+        except (KeyError, RuntimeError, ValueError) as error:
             raise ModelError(
                 f"{paths[0]} and {paths[1]} do not hold the weights of LPIPS: {error}."
             ) from error

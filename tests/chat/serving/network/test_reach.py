@@ -11,11 +11,19 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from ico3d.chat.serving.guard import is_own
 from ico3d.chat.serving.network import addresses, certificates, reach
 from ico3d.chat.serving.network.certificates import given_certificate
-from ico3d.chat.serving.network.reach import Reach, checked_name, find_reach, machine_names, qr_code
+from ico3d.chat.serving.network.reach import (
+    Reach,
+    as_seen,
+    checked_name,
+    find_reach,
+    machine_names,
+    qr_code,
+)
 from ico3d.errors import SettingsError
 
 
@@ -122,6 +130,15 @@ def test_a_key_that_holds_up_everybody_is_told(tmp_path, monkeypatch):
 def test_not_everybody_is_believed_where_he_comes_from(proxy):
     with pytest.raises(SettingsError, match="--proxy"):
         find_reach("127.0.0.1", [], False, None, None, proxies=[proxy])
+
+
+@pytest.mark.parametrize("proxy", ["172.18.0.0/16", "172.18.3.4", "2001:db8::/64"])
+def test_a_proxy_is_known_by_a_socket_of_both_families_too(proxy):
+    trusted = ProxyHeadersMiddleware(None, as_seen([proxy])).trusted_hosts  # type: ignore[arg-type]
+    four = proxy.startswith("172")
+    assert ("::ffff:172.18.3.4" in trusted) is ("172.18.3.4" in trusted) is four
+    assert ("2001:db8::7" in trusted) is not four
+    assert not any(other in trusted for other in ("::ffff:172.19.3.4", "172.19.3.4", "::1"))
 
 
 def test_a_given_certificate_brings_its_names_and_no_question(tmp_path):

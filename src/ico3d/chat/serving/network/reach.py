@@ -220,6 +220,13 @@ def checked_proxy(text: str) -> str:
     return text
 
 
+def as_seen(proxies: Sequence[str]) -> list[str]:
+    """Addresses and networks as connections show them: a socket of both families maps IPv4."""
+    networks = [network for text in proxies if (network := ipaddress.ip_network(text)).version == 4]
+    mapped = [f"::ffff:{one.network_address}/{96 + one.prefixlen}" for one in networks]
+    return [*proxies, *mapped]
+
+
 def fragment(key: str | None) -> str:
     """What follows a page's address, and never leaves the browser, to hold a key."""
     return f"#key={key}" if key else ""
