@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, Word
-from ico3d.motion.composing.composer import Composer
+from ico3d.motion.composing.composer import NOD, NODS_APART, Composer
 from ico3d.motion.composing.cues import SETTLE, Cue, Direction, Release, clip_time, weight
 from ico3d.motion.composing.gaze import CHEST_YAW, FACE_SPEED, HEAD_YAW, Gaze, direction_to
 from ico3d.motion.composing.performer import Performer
@@ -71,14 +71,31 @@ def test_strokes_fall_on_accents_and_none_is_cut_off(clips, seed, step):
     releases = {d.number: d.time for d in found if isinstance(d, Release)}
     peaks = np.array([(word.begin + word.end) / 2 for word in words])
     assert len(cues) >= 4 and set(releases) == {cue.number for cue in cues}
+    assert sorted(releases) == list(range(len(cues)))
+    cues.sort(key=lambda cue: cue.number)
     for number, cue in enumerate(cues):
-        assert cue.number == number
         assert np.abs(peaks - cue.stroke).min() <= 0.03
         held = clips[cue.name].marks.release > clips[cue.name].marks.hold
         assert releases[number] >= cue.stroke + (SETTLE if held else 0) - 1e-9
         for other in cues[:number]:
             if sides(cue, clips) & sides(other, clips):
                 assert cue.begin >= other.stroke + SETTLE - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_head_nods_to_what_hands_leave_and_takes_nothing_from_them(clips, seed):
+    still = {name: clip for name, clip in clips.items() if name != NOD}
+    cues, without = (
+        [d for d in grown(some, seed, 0.5) if isinstance(d, Cue)] for some in (clips, still)
+    )
+    nods = [cue.stroke for cue in cues if cue.name == NOD]
+    assert len(nods) >= 3
+    assert min(np.diff(sorted(nods))) >= NODS_APART[0] - 1e-9
+
+    def hands(found):
+        return [(c.name, c.mirror, c.stroke) for c in found if "head" not in sides(c, clips)]
+
+    assert hands(cues) == hands(without)
 
 
 def test_words_get_their_gestures(clips):

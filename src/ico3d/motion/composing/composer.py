@@ -5,6 +5,8 @@ that begins also arrives, and its end is held for a moment; a gesture is held un
 or the next gesture needs the hands.
 """
 
+from collections import deque
+
 import numpy as np
 
 from ico3d.motion.clip import Clip, meaning
@@ -36,7 +38,10 @@ wave, which takes longer to raise than a hello lasts."""
 AGAIN = 5.0
 """Least time in seconds until the same meaning is shown again."""
 FAINT = -9.0
-"""Accents below this strength, in dB, get no beat."""
+"""Accents below this strength, in dB, get no beat and no nod."""
+NOD, NODS_APART = "small_nod", (1.1, 2.6)
+"""What the head does with accents for which hands do nothing, and the range of the random least
+time in seconds from one of its strokes to the next: who stresses a word moves the head, too."""
 STRONGER, NEAR = 2.0, 0.5
 """An accent gets no beat if one is stronger by this many dB within this many seconds after it."""
 LONGEST_HOLD = 1.3
@@ -82,6 +87,7 @@ class Composer:
         self._struck: dict[str, float] = {}  # by limb, time of its last stroke
         self._shown: dict[str, float] = {}  # by meaning, time of its last stroke
         self._wanted: list[str] = []
+        self._bare = deque[Accent]()  # stressed, and hands do nothing for them
         self._new: list[Direction] = []
 
     def know(self, words: tuple[Word, ...], levels: Array) -> None:
@@ -123,6 +129,7 @@ class Composer:
         for index, accent in enumerate(stresses):
             if accent.word >= self._next and not self._decide(index, stresses, meant, until):
                 break
+            self._nod(until)
         self._let_go(until)
         self._handed = max(self._handed, until)
         return sorted(self._new, key=_moment)
@@ -139,6 +146,7 @@ class Composer:
         """
         self._new = []
         self._words, self._wanted, self._accents = (), [], GrowingAccents()
+        self._bare.clear()
         for cue in list(self._held.values()):
             self._release(cue, max(now, self._earliest(cue)))
         return sorted(self._new, key=_moment)
@@ -175,8 +183,28 @@ class Composer:
                     self._cue(name, mirror, begin, chosen.time, skip)
                     self._next = chosen.word + 1
                     return True
+        if NOD in self._takes and self._is_stressed(accent):
+            self._bare.append(accent)
         self._next = accent.word + 1
         return True
+
+    def _nod(self, until: float) -> None:
+        """Cues nods to stressed accents for which hands do nothing, as often as it is time to."""
+        while self._bare:
+            accent = self._bare[0]
+            low, high = NODS_APART
+            gap = low + (high - low) * chance(self._seed, accent.word, 5)
+            if accent.time - self._struck.get("head", -np.inf) >= gap:
+                name, mirror = self._takes.one(NOD, False, chance(self._seed, accent.word, 3))
+                begin, skip = self._beginning(name, mirror, accent.time)
+                if begin is not None and begin >= until:
+                    return
+                if begin is not None:
+                    self._cue(name, mirror, begin, accent.time, skip)
+            self._bare.popleft()
+
+    def _is_stressed(self, accent: Accent) -> bool:
+        return accent.strength >= FAINT and stressed(self._words[accent.word])
 
     def _choice(
         self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str]
@@ -205,7 +233,7 @@ class Composer:
         accent nor a gesture with a meaning may follow soon.
         """
         accent = stresses[index]
-        if accent.strength < FAINT or not stressed(self._words[accent.word]):
+        if not self._is_stressed(accent):
             return False
         low, high = APART
         gap = low + (high - low) * chance(self._seed, accent.word, 2)
