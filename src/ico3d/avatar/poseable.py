@@ -10,7 +10,7 @@ import torch
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baked_body import skinned_gaussians
 from ico3d.avatar.head_joint import rig_of, trained_poses
-from ico3d.avatar.render_bundle import baked_gaussians
+from ico3d.avatar.render_bundle import baked_gaussians, gaze_at
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.skinning.skinned import Skinned
 from ico3d.bundle.format import Bundle
@@ -116,6 +116,7 @@ def poseable_of(
     model: TrainedAvatar | TrainedBody | Bundle,
     frame: int | None,
     cuts: Sequence[Cut] | None = None,
+    visitor: np.ndarray | None = None,
 ) -> Poseable | None:
     """The poseable person of a trained model or bundle.
 
@@ -125,6 +126,8 @@ def poseable_of(
         frame: Recorded frame that says where the person stands; by default the middle frame.
         cuts: Gestures in the recording of a trained model; None finds them by rule. Not used for
             bundles, which have their own.
+        visitor: (3,) point in the world, metres, at which the eyes of a bundle's head look if they
+            turn; by default they look where the head does.
 
     Returns:
         The person; None where the body has no skeleton, or one without the joints that gestures
@@ -132,7 +135,7 @@ def poseable_of(
     """
     try:
         if isinstance(model, Bundle):
-            return _baked(model, frame)
+            return _baked(model, frame, visitor)
         body = model.body if isinstance(model, TrainedAvatar) else model
         rig = rig_of(body)
         return None if rig is None else _trained(model, body, rig, frame, cuts)
@@ -140,7 +143,7 @@ def poseable_of(
         return None
 
 
-def _baked(bundle: Bundle, frame: int | None) -> Poseable | None:
+def _baked(bundle: Bundle, frame: int | None, visitor: np.ndarray | None) -> Poseable | None:
     baked = bundle.skinned
     if baked is None or bundle.gestures is None:
         return None
@@ -150,16 +153,24 @@ def _baked(bundle: Bundle, frame: int | None) -> Poseable | None:
         living(baked.rig, 0, bundle.hung),
         (stands.rotations, stands.root),
         lambda rotations, root: skinned_gaussians(baked, any_pose(baked, rotations, root)),
-        _baked_head(bundle, frame),
+        _baked_head(bundle, frame, visitor),
         bundle.gestures,
     )
 
 
-def _baked_head(bundle: Bundle, frame: int) -> DrawHead | None:
-    if bundle.head is None or bundle.world_from_head is None:
+def _baked_head(bundle: Bundle, frame: int, visitor: np.ndarray | None) -> DrawHead | None:
+    info = bundle.manifest.head
+    if info is None or bundle.head is None or bundle.world_from_head is None:
         return None
     head, placed = bundle.head, bundle.world_from_head[frame].astype(np.float64)
-    return lambda moved, expression: baked_gaussians(head, expression).transform(moved @ placed)
+
+    def drawn(moved: Array, expression: np.ndarray) -> Gaussians:
+        pose = moved @ placed
+        looks = info.gaze is not None and visitor is not None
+        gaze = gaze_at(info.gaze, np.linalg.inv(pose), visitor) if looks else None
+        return baked_gaussians(head, expression, gaze).transform(pose)
+
+    return drawn
 
 
 def _trained(

@@ -13,26 +13,49 @@ from ico3d.avatar.baked_body import BakedBody, body_of, gaussians_at
 from ico3d.bundle.evaluate import attributes, centres
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
-from ico3d.bundle.manifest import CameraInfo
+from ico3d.bundle.manifest import CameraInfo, GazeInfo
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.files import full_disk
 from ico3d.head.portrait.neck import bent
+from ico3d.motion.composing.gaze import direction_to
 from ico3d.splat import harmonics
 from ico3d.splat.files.formats import read_gaussians
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 
-def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
-    """The N Gaussians of a baked head for an expression (B,), in canonical head space."""
+def baked_gaussians(
+    head: BakedHead, expression: np.ndarray, gaze: tuple[float, float] | None = None
+) -> Gaussians:
+    """The N Gaussians of a baked head for an expression (B,), in canonical head space.
+
+    `gaze` is that of `ico3d.bundle.evaluate.centres`.
+    """
     rgb, opacity = attributes(head, expression)
     return Gaussians(
-        means=torch.from_numpy(centres(head, expression)),
+        means=torch.from_numpy(centres(head, expression, gaze)),
         quats=torch.tensor(head.quats.astype(np.float32)),
         scales=torch.tensor(head.scales.astype(np.float32)).exp(),
         opacities=torch.from_numpy(opacity),
         colors=torch.from_numpy(rgb),
     )
+
+
+def gaze_at(info: GazeInfo, head_from_world: np.ndarray, point: np.ndarray) -> tuple[float, float]:
+    """How eyes are turned that look at a point, as far as they turn.
+
+    Args:
+        info: The manifest's entry about the head's eyes.
+        head_from_world: (4, 4) rigid transform to canonical head space.
+        point: (3,) metres in the world.
+
+    Returns:
+        Radians to the person's left, and downwards.
+    """
+    local = head_from_world[:3, :3] @ point + head_from_world[:3, 3]
+    wanted = direction_to(np.array(info.eyes), local)
+    yaw, pitch = np.clip(wanted, np.negative(info.most), info.most)
+    return float(yaw), float(pitch)
 
 
 def swaying_head(bundle: Bundle, expression: np.ndarray, row: float) -> Gaussians:

@@ -2,12 +2,17 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.baking import eyeballs
 from ico3d.avatar.baking.eyeballs import RADIUS, with_still_eyes, with_turning_eyes
+from ico3d.avatar.poseable import poseable_of
+from ico3d.avatar.render_bundle import gaze_at
 from ico3d.bundle.evaluate import centres
+from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead, no_displacements
 from ico3d.bundle.manifest import GazeInfo
+from ico3d.bundle.packaged import NAME, bundle_path
 
 CENTRES = np.array([[-0.031, 0.004, 0.05], [0.031, 0.004, 0.05]])
 IDLE = np.zeros(39, np.float32)
@@ -105,3 +110,35 @@ def test_still_eyes_are_as_before():
     again, gaze = with_turning_eyes(with_still_eyes(turning), IDLE, marks)
     assert isinstance(gaze, GazeInfo)
     assert (again.displacement_basis == turning.displacement_basis).all()
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.6])
+def test_eyes_look_at_a_point_as_far_as_they_turn(turned: float):
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_rotvec([0.0, turned, 0.0]).as_matrix()
+    pose[:3, 3] = 1.0, 1.5, -2.0
+    info = GazeInfo((0.0, 0.01, 0.06), (0.2, 0.1))
+
+    def seen(*local: float) -> tuple[float, float]:
+        point = pose[:3, :3] @ (np.array(info.eyes) + local) + pose[:3, 3]
+        return gaze_at(info, np.linalg.inv(pose), point)
+
+    assert seen(0.1, 0.0, 1.0) == pytest.approx((np.arctan(0.1), 0.0))
+    assert seen(0.0, -0.05, 1.0) == pytest.approx((0.0, np.arctan(0.05)))
+    assert seen(-3.0, 2.0, 1.0) == pytest.approx((-0.2, -0.1))
+
+
+def test_the_packaged_person_looks_at_who_films_her():
+    bundle = Bundle.open(bundle_path(NAME))
+    info = bundle.manifest.head
+    assert info is not None and info.gaze is not None
+    idle = np.array(info.idle_expression, np.float32)
+    poses = {}
+    for side in (-1.0, 1.0):
+        person = poseable_of(bundle, 0, visitor=np.array([side, 1.5, 2.0]))
+        assert person is not None and person.head is not None
+        poses[side] = person.head(np.eye(4), idle).means.numpy()
+    apart = poses[1.0] - poses[-1.0]
+    eyes = np.linalg.norm(apart, axis=1) > 0.003
+    assert 100 < eyes.sum() < 600  # of 16,000
+    assert (apart[eyes, 0] > 0.003).all()  # to her left where the visitor is

@@ -102,7 +102,7 @@ def bundle_actor(bundle: Bundle) -> Actor:
     stage = (manifest.camera, portrait, manifest.background)
     behind = backdrop_gaussians(bundle)
     frame = bundle.animation.rest.end if bundle.animation else None
-    poseable = poseable_of(bundle, frame)
+    poseable = poseable_of(bundle, frame, visitor=np.array(portrait.eye))
     return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation, behind, poseable)
 
 
