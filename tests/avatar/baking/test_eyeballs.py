@@ -141,4 +141,4 @@ def test_the_packaged_person_looks_at_who_films_her():
     apart = poses[1.0] - poses[-1.0]
     eyes = np.linalg.norm(apart, axis=1) > 0.003
     assert 100 < eyes.sum() < 600  # of 16,000
-    assert (apart[eyes, 0] > 0.003).all()  # to her left where the visitor is
+    assert np.median(apart[eyes, 0]) > 0.004  # to her left where the visitor is

@@ -28,9 +28,9 @@ def _grid(*spans: tuple[float, float, float]) -> np.ndarray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-SOUGHT = _grid((-2.5, 2.5, 0.5), (-2, 3.5, 0.5), (-16, -6, 0.25))
+SOUGHT = _grid((-2.5, 2.5, 0.5), (-2, 3.5, 0.5), (-16, -6, 0.5))
 """Where a ball's centre may lie, from the middle of the lids' landmarks, x, y and z."""
-NEARER = _grid((-0.4, 0.4, 0.1), (-0.4, 0.4, 0.2), (-0.2, 0.2, 0.1))
+NEARER = _grid((-0.4, 0.4, 0.1), (-0.4, 0.4, 0.2), (-0.4, 0.4, 0.1))
 """Where it may lie, from the best place of `SOUGHT`."""
 THICK = 0.0005
 """Metres within which Gaussians of the surface lie about it."""
