@@ -70,7 +70,7 @@ def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None
     Raises:
         StorageError: If the disk is full, or would nearly be; a file that was there before is kept.
     """
-    check_left(path.parent, path, size_of_tensors(tensors))
+    _make_room(path, tensors)
     write_atomic(path, lambda temporary: _stream(temporary, tensors, {}, state))
 
 
@@ -96,8 +96,14 @@ def save_sealed(
             file.seek(8 + len(_SEALED))
             file.write(found)
 
-    check_left(path.parent, path, size_of_tensors(tensors))
+    _make_room(path, tensors)
     write_atomic(path, write, before)
+
+
+def _make_room(path: Path, tensors: Mapping[str, Tensor]) -> None:
+    """Makes a file's folder, and refuses to write tensors that would nearly fill its disk."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    check_left(path.parent, path, size_of_tensors(tensors))
 
 
 def size_of_tensors(tensors: Mapping[str, Tensor]) -> int:
