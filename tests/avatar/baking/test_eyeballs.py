@@ -1,5 +1,7 @@
 """Eyeballs are found behind lids and turn by the gaze; what is no ball keeps still."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -93,6 +95,18 @@ def test_children_and_large_eyes_are_found():
         assert gaze is not None
         moved = np.abs(centres(turning, IDLE, (0.2, 0.0)) - head.means).max(axis=1) > 1e-4
         assert not moved[~of_balls].any() and moved[of_balls].mean() > 0.6
+
+
+def test_a_crowd_between_the_lids_takes_little_memory():
+    head, marks, _ = face()
+    rng = np.random.default_rng(1)
+    crowd = marks[36:42].mean(0) + rng.uniform(-1, 1, (50_000, 3)) * (0.008, 0.003, 0.004)
+    crowded = head_of(np.concatenate([head.means, crowd]).astype(np.float32))
+    tracemalloc.start()
+    with_turning_eyes(crowded, IDLE, marks)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 100e6  # bytes; 8 GB where each is compared with each place
 
 
 def test_what_is_no_ball_keeps_still():

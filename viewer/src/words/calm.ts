@@ -3,9 +3,12 @@ export const LONGEST = 4000;
 const BRIEF = 300;
 const LONG = 100; // letters of a word without a place to break
 
+/** What is never laid out, and means something else once a letter is put in. */
+const VERBATIM = 'arguments';
+
 /** What a stranger's JSON says, its texts made calm. */
 export function parseCalmly(text: string): unknown {
-  return JSON.parse(text, (_, value: unknown) => (typeof value === 'string' ? calm(value) : value));
+  return JSON.parse(text, (key, value: unknown) => (typeof value === 'string' && key !== VERBATIM ? calm(value) : value));
 }
 
 /**

@@ -54,6 +54,11 @@ describe('marks on a letter', () => {
     expect(sentenceOf(new Error(letters))).toMatchObject({ values: { detail: brief(letters) } });
   });
 
+  test('arguments of a call stay as they are', () => {
+    const given = JSON.stringify({ url: `https://example.org/file?token=${letters}` });
+    expect(decode(JSON.stringify({ type: 'call', name: 'open', arguments: given }))).toMatchObject({ arguments: given });
+  });
+
   test('so it is in what a server sends', () => {
     const said = decode(JSON.stringify({ type: 'transcript', text: `a${'\u0301'.repeat(9000)}`, final: false }));
     expect(said).toMatchObject({ text: `a${'\u0301'.repeat(16)}` });

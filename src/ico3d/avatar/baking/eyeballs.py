@@ -9,6 +9,7 @@ from ico3d.bundle.evaluate import attributes, centres
 from ico3d.bundle.head import BakedHead, no_displacements
 from ico3d.bundle.manifest import GazeInfo
 from ico3d.common.expression import EYE_UNIT, MOST_DISPLACEMENTS
+from ico3d.common.spread import spread
 
 LIDS = (slice(36, 42), slice(42, 48))
 """Landmarks of both eyes, in the order of Multi-PIE's 68 points."""
@@ -37,6 +38,9 @@ THICK = 0.0005
 FEWEST, ROUND = 12, 0.3
 """Fewest Gaussians of which an eye must be made, of fewer a turned eye has holes; and the least
 share of what is seen between the lids that must lie on a ball."""
+FAINT, MOST, BLOCK = 0.02, 1000, 256
+"""Opacity of what is not seen; Gaussians between the lids, of some hundred usually, and places at
+once that are looked at: whose head it is decides on the memory that this takes."""
 INSIDE, OUTSIDE, AROUND = 0.0045, 0.0007, 0.0025
 """Metres under and over the ball's surface, and beside the opened lids, where an eye's own
 Gaussians lie: an iris is under the cornea, and lids lie over the ball."""
@@ -108,10 +112,11 @@ def eyeball(head: BakedHead, idle: np.ndarray, lids: np.ndarray) -> Eyeball | No
     """
     places, opacities = centres(head, idle).astype(np.float64), attributes(head, idle)[1]
     near = np.abs(places[:, 2] - lids[:, 2].mean()) < RADIUS
-    between = near & _within(lids[:, :2], places)  # (N,)
-    if between.sum() < FEWEST:
+    between = np.flatnonzero(near & _within(lids[:, :2], places) & (opacities > FAINT))  # (n,)
+    if len(between) < FEWEST:
         return None
-    centre, share = _ball(places[between], opacities[between], lids.mean(axis=0))
+    looked = between[spread(len(between), MOST)]
+    centre, share = _ball(places[looked], opacities[looked], lids.mean(axis=0))
     if share < ROUND:
         return None
     distance = np.linalg.norm(places - centre, axis=1)  # (N,)
@@ -136,10 +141,20 @@ def _ball(points: np.ndarray, weights: np.ndarray, middle: np.ndarray) -> tuple[
     """
     for places in (SOUGHT, NEARER):
         tried = middle + places  # (C, 3)
-        off = np.linalg.norm(points[None] - tried[:, None], axis=2) - RADIUS  # (C, n)
-        scores = np.exp(-((off / THICK) ** 2)) @ weights  # (C,)
+        scores = np.concatenate([_scores(block, points, weights) for block in _blocks(tried)])
         middle = tried[scores.argmax()]
     return middle, float(scores.max() / weights.sum())
+
+
+def _scores(tried: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(C,) how much of the weights lies on the surface of a ball about each of (C, 3) centres."""
+    off = np.linalg.norm(points[None] - tried[:, None], axis=2) - RADIUS  # (C, n)
+    return np.exp(-((off / THICK) ** 2)) @ weights
+
+
+def _blocks(tried: np.ndarray) -> list[np.ndarray]:
+    """The places (C, 3) in pieces that take little memory each."""
+    return np.array_split(tried, max(1, len(tried) // BLOCK))
 
 
 def _within(outline: np.ndarray, places: np.ndarray) -> np.ndarray:

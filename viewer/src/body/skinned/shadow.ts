@@ -6,6 +6,7 @@ const { radius: RADIUS, texel: TEXEL, side: SIDE } = SHADOW;
 const REACH = RADIUS / TEXEL;
 const POINT = 1e-4; // metres
 const FAR = -1e9; // where no sphere lies
+const OUTSIDE = 2 ** 30; // columns and rows beyond which nobody stands, and far beyond which counting by one goes nowhere
 
 /** The spheres as the lamp sees them: how far towards it the nearest one reaches, in a map that repeats. */
 export class ShadowMap {
@@ -61,6 +62,7 @@ export class ShadowMap {
 
   /** Draws a sphere whose centre is at a column and row of the map, and so many metres towards the lamp. */
   private sphere(x: number, y: number, towards: number): void {
+    if (!(Math.abs(x) < OUTSIDE && Math.abs(y) < OUTSIDE)) return;
     const { depths } = this;
     for (let row = Math.ceil(y - REACH); row <= y + REACH; row++) {
       const line = (row & (SIDE - 1)) * SIDE;
