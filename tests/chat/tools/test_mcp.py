@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import pytest
 from fastapi import FastAPI
 from fastapi.responses import RedirectResponse
+from loguru import logger
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN
 
@@ -19,7 +20,7 @@ from ico3d.chat import conversation
 from ico3d.chat.settings.conversation import read_settings
 from ico3d.chat.settings.mcp import McpServer
 from ico3d.chat.tools import check_ready, extended
-from ico3d.chat.tools.mcp import Connection, Connections
+from ico3d.chat.tools.mcp import MOST_LETTERS, Connection, Connections
 from ico3d.errors import MissingExtraError, SettingsError
 from support.chat.mcp_server import COMMAND, museum
 from support.chat.scripted_server import Call, Script, running
@@ -110,6 +111,33 @@ def test_of_two_functions_with_one_name_the_first_stays():
     first, second, third = (FunctionSchema(name, "", {}, []) for name in ("a", "a", "b"))
     tools = extended(extended(NOT_GIVEN, [first]), [second, third])
     assert tools.standard_tools == [first, third]
+
+
+def test_functions_that_no_model_can_be_told_are_left_out():
+    def schema(name, about="", **properties):
+        return FunctionSchema(name, about, properties, [])
+
+    endless: dict = {}
+    endless["x"] = endless
+    offered = [
+        schema("a", n={"maximum": 3}),
+        schema("infinite", n={"maximum": float("inf")}),
+        schema("none", n={"maximum": float("nan")}),
+        schema("endless", n=endless),
+        schema("long", "x" * MOST_LETTERS),
+        schema("b", "y" * (MOST_LETTERS // 2)),
+        schema("late", "z" * (MOST_LETTERS // 2)),
+        schema("c"),
+    ]
+    messages = []
+    sink = logger.add(messages.append, level="WARNING")
+    try:
+        kept = Connection(McpServer("museum", COMMAND))._readable(offered)
+    finally:
+        logger.remove(sink)
+    assert [function.name for function in kept] == ["a", "b", "c"]
+    (said,) = map(str, messages)
+    assert "museum" in said and "without infinite, none, endless, long, late." in said
 
 
 @pytest.mark.real_time

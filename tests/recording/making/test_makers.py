@@ -209,6 +209,22 @@ def test_a_server_that_comes_back_goes_on(people, makers):
         again.close()
 
 
+def test_a_server_starts_whatever_lies_in_somebodys_folder(people, makers, monkeypatch, caplog):
+    ida = Places(people.person("Ida").folder).folder
+    (ida / "log.txt").mkdir(parents=True)
+    write_progress(ida, Progress("running", "good"))
+    makers.go_on()  # a folder is no log to write into
+    assert "Ida is not gone on with" in caplog.text and not makers._running
+
+    def full(*_):
+        raise StorageError("the disk is full.")
+
+    (ida / "log.txt").rmdir()
+    monkeypatch.setattr(room, "write_progress", full)
+    makers.go_on()
+    assert "the disk is full" in caplog.text and not makers._running
+
+
 def test_a_server_that_is_killed_takes_its_processes_along(people, makers):
     ada = people.person("Ada")
     makers.begin(ada, "good")

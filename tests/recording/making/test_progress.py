@@ -91,11 +91,16 @@ def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
     assert (missing["code"], missing["detail"]) == ("voice-lacking", lacking)
 
 
+ODD_PAIRS = [('"running"', text) for text in ("5", "null", '["x"]', '"better"', "{}")]
+ODD_PAIRS += [(text, '"good"') for text in ("5", "null", '["x"]', '"going"')]
+
+
 def test_what_is_damaged_is_nothing(tmp_path):
     assert read_progress(tmp_path) is None
     whole = '{"state": "made", "quality": "good", "%s": %s}'
     odd = [whole % ("made_of", "3"), whole % ("decibels", "Infinity"), "[" * 100_000]
     odd += [whole % ("advice", "[" + "[]," * 30_000 + "[]]")]
+    odd += [f'{{"state": {state}, "quality": {quality}}}' for state, quality in ODD_PAIRS]
     odd += [whole % ("told", '"x"'), whole % ("left", "[]"), whole % ("later", "9" * 400)]
     for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}', *odd):
         (tmp_path / "progress.json").write_text(text)

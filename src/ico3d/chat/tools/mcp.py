@@ -5,6 +5,7 @@ for the model, and the next call connects anew.
 """
 
 import asyncio
+import json
 import os
 import re
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -32,6 +33,7 @@ LONGEST_NAME = 64  # that models accept for a function
 LONGEST_COMPLAINT = 200
 LONGEST_END = 10.0  # s in which a connection ends: a program is asked twice, and killed after 4
 MOST_FUNCTIONS = 64  # of a server: all their descriptions are part of every question
+MOST_LETTERS = 64 * 1024  # of all descriptions of a server, with what they say of arguments
 
 Offer = Callable[[list[FunctionSchema]], None]
 
@@ -81,6 +83,15 @@ class _Line:
     task: asyncio.Task[None] | None = None
 
 
+def _size(function: FunctionSchema) -> int | None:
+    """Letters of what a model is told of a function; None where it cannot be told."""
+    told = [function.name, function.description, function.properties, function.required]
+    try:
+        return len(json.dumps(told, allow_nan=False))
+    except (ValueError, TypeError, RecursionError):
+        return None
+
+
 class Connection:
     """A connection to one server, opened by the first use and again after it was lost."""
 
@@ -99,7 +110,27 @@ class Connection:
             listed = await (await self._client()).list_tools()
         wanted = self.server.functions
         chosen = [tool for tool in listed.tools if not wanted or tool.name in wanted]
-        return [self._function(tool) for tool in chosen[:MOST_FUNCTIONS]]
+        return self._readable([self._function(tool) for tool in chosen[:MOST_FUNCTIONS]])
+
+    def _readable(self, functions: list[FunctionSchema]) -> list[FunctionSchema]:
+        """Those that can be told to a model with every question; the log names the others."""
+        kept: list[FunctionSchema] = []
+        left: list[str] = []
+        room = MOST_LETTERS
+        for function in functions:
+            size = _size(function)
+            if size is None or size > room:
+                left.append(function.name)
+                continue
+            kept.append(function)
+            room -= size
+        if left:
+            names = ", ".join(left)[:LONGEST_COMPLAINT]
+            logger.warning(
+                f"{self.server.where} tells more of its functions than a model reads, or what "
+                f"cannot be written as JSON: without {names}."
+            )
+        return kept
 
     async def call(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """Calls a function: returns `result`, or `error` in one sentence for the model."""

@@ -1,6 +1,7 @@
 """Starts and stops the processes that make avatars."""
 
 import contextlib
+import logging
 import shutil
 import signal
 import subprocess
@@ -12,7 +13,7 @@ from typing import Any, cast
 from ico3d.bundle.packaged import NAME
 from ico3d.common.files import remove_unfinished
 from ico3d.creating.settings import QUALITIES, QualityName
-from ico3d.errors import StorageError
+from ico3d.errors import Ico3dError, StorageError
 from ico3d.failures import FAILURES
 from ico3d.recording.beside import FULL_DISK, start, stop
 from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice
@@ -24,6 +25,7 @@ from ico3d.recording.making.progress import Progress, begun, read_progress, writ
 from ico3d.recording.making.sources import signature, sources
 from ico3d.recording.refusals import Refused
 
+_log = logging.getLogger(__name__)
 WORKER = "ico3d.recording.making.worker"
 LOG = "log.txt"
 ENDS = {-signal.SIGKILL: "killed", FULL_DISK: "disk-full"}
@@ -216,6 +218,8 @@ class Makers:
                     self.begin(person, found.quality)
                 except Refused:
                     self.stop(person)  # another one came first: its turn is when somebody asks
+                except (Ico3dError, OSError) as error:  # a full disk, or strange files
+                    _log.warning("The avatar of %s is not gone on with: %s", name, error)
 
     def close(self) -> None:
         """Ends all processes; what they made is gone on with at the next start."""

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from PIL import Image
 
@@ -87,6 +87,8 @@ def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""
     try:
         found = Progress(**noted(folder / FILE))
+        if found.state not in get_args(State) or found.quality not in get_args(QualityName):
+            return None
         left = None if found.left is None else float(found.left)
         numbers = {"left": left, "later": float(found.later), "told": float(found.told)}
         lists = {"advice": tuple(found.advice), "refused": tuple(found.refused)}

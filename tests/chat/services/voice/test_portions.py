@@ -28,6 +28,8 @@ SENTENCE = "It was a bright cold day in April, and the clocks were striking thir
         ("word " * 41, ["word " * 40, "word "]),
         ("b" * 150 + " " + "c" * 100, ["b" * 150 + " ", "c" * 100]),
         ("ﷺ" * 25, ["ﷺ" * 11, "ﷺ" * 11, "ﷺ" * 3]),
+        ("龍" * 70, ["龍" * 66, "龍" * 4]),
+        ("⠿" * 20, ["⠿" * 16, "⠿" * 4]),
     ],
 )
 def test_a_text_is_cut_between_words(text, cut):

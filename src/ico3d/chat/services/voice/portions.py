@@ -8,6 +8,9 @@ MOST = 200
 """Letters of a portion, written out: the one letter `ﷺ` is read as eighteen."""
 
 
+_SIGN, _NAMED = 3, 12
+"""Letters for which a sign of Chinese counts, and one that is read by its name: a voice of another
+language says of both what they are."""
 _WORD = 64
 _UNSPACED = r"\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff"
 _ENDLESS = re.compile(rf"[^\s{_UNSPACED}]{{{_WORD}}}(?=[^\s{_UNSPACED}])")
@@ -43,4 +46,15 @@ def portions(text: str) -> Iterator[str]:
 
 
 def _written(text: str) -> int:
-    return sum(len(unicodedata.normalize("NFKC", char)) for char in text)
+    """About how many letters are spoken of a text: a sign is read as a syllable, or by its name."""
+    return sum(_NAMED if _is_named(char) else _spelled(char) for char in text)
+
+
+def _spelled(char: str) -> int:
+    length = len(unicodedata.normalize("NFKC", char))
+    return length * (_SIGN if "\u2e80" <= char <= "\u9fff" else 1)
+
+
+def _is_named(char: str) -> bool:
+    """Whether it is a picture or a pattern, such as an emoji or braille."""
+    return unicodedata.category(char) == "So"
