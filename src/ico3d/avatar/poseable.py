@@ -166,8 +166,9 @@ def _baked_head(bundle: Bundle, frame: int, visitor: np.ndarray | None) -> DrawH
 
     def drawn(moved: Array, expression: np.ndarray) -> Gaussians:
         pose = moved @ placed
-        looks = info.gaze is not None and visitor is not None
-        gaze = gaze_at(info.gaze, np.linalg.inv(pose), visitor) if looks else None
+        gaze = None
+        if info.gaze is not None and visitor is not None:
+            gaze = gaze_at(info.gaze, np.linalg.inv(pose), visitor)
         return baked_gaussians(head, expression, gaze).transform(pose)
 
     return drawn

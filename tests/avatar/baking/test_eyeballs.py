@@ -114,6 +114,8 @@ def test_what_is_no_ball_keeps_still():
     assert with_turning_eyes(head, IDLE, marks) == (head, None)
     assert with_turning_eyes(head, IDLE, None) == (head, None)
     assert with_turning_eyes(head, IDLE, marks + np.array([0, 0.03, 0])) == (head, None)
+    for odd in (0 * marks, marks * (1, 0, 1), marks + 1.0, marks * 1e300):
+        assert with_turning_eyes(head, IDLE, odd) == (head, None)
 
 
 def test_still_eyes_are_as_before():

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import Delaunay
 
+from ico3d.avatar.staging import triple
 from ico3d.bundle.evaluate import attributes, centres
 from ico3d.bundle.head import BakedHead, no_displacements
 from ico3d.bundle.manifest import GazeInfo
@@ -38,6 +39,9 @@ THICK = 0.0005
 FEWEST, ROUND = 12, 0.3
 """Fewest Gaussians of which an eye must be made, of fewer a turned eye has holes; and the least
 share of what is seen between the lids that must lie on a ball."""
+FARTHEST, NARROWEST = 0.9, 0.002
+"""Metres from the origin of canonical head space where landmarks of an eye lie at most; and how far
+those of an eye that is open spread at least, up and down."""
 FAINT, MOST, BLOCK = 0.02, 1000, 256
 """Opacity of what is not seen; Gaussians between the lids, of some hundred usually, and places at
 once that are looked at: whose head it is decides on the memory that this takes."""
@@ -86,8 +90,7 @@ def with_turning_eyes(
         for turn, axis in zip(turns, ([0.0, 1.0, 0.0], [1.0, 0.0, 0.0]), strict=True):
             turn[ball.own] = np.cross(axis, arm)
     point = np.mean([ball.centre for ball in balls], axis=0)
-    info = GazeInfo(tuple(round(float(value), 5) for value in point), MOST_TURN)  # type: ignore[arg-type]
-    return _with_displacements(head, turns), info
+    return _with_displacements(head, turns), GazeInfo(triple(point), MOST_TURN)
 
 
 def with_still_eyes(head: BakedHead) -> BakedHead:
@@ -110,6 +113,8 @@ def eyeball(head: BakedHead, idle: np.ndarray, lids: np.ndarray) -> Eyeball | No
         idle: (B,) expression at rest, with open eyes.
         lids: (6, 3) landmarks around the opened eye, metres.
     """
+    if not _is_open(lids):
+        return None
     places, opacities = centres(head, idle).astype(np.float64), attributes(head, idle)[1]
     near = np.abs(places[:, 2] - lids[:, 2].mean()) < RADIUS
     between = np.flatnonzero(near & _within(lids[:, :2], places) & (opacities > FAINT))  # (n,)
@@ -155,6 +160,14 @@ def _scores(tried: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.nd
 def _blocks(tried: np.ndarray) -> list[np.ndarray]:
     """The places (C, 3) in pieces that take little memory each."""
     return np.array_split(tried, max(1, len(tried) // BLOCK))
+
+
+def _is_open(lids: np.ndarray) -> bool:
+    """Whether landmarks (6, 3) lie around an opening near the head, and not on a line."""
+    if not (np.abs(lids) < FARTHEST).all():
+        return False
+    across = np.linalg.svd(lids[:, :2] - lids[:, :2].mean(axis=0), compute_uv=False)
+    return bool(across[1] > NARROWEST)
 
 
 def _within(outline: np.ndarray, places: np.ndarray) -> np.ndarray:
