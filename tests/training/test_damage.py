@@ -143,7 +143,7 @@ def test_metrics_without_an_end_of_a_line_are_not_kept_in_memory(died):
     text = (died / "metrics.jsonl").read_bytes().splitlines(keepends=True)
     with (died / "metrics.jsonl").open("wb") as file:
         file.write(text[0])
-        file.truncate(file.tell() + (64 << 20))
+        file.truncate(file.tell() + (60 << 20))
         file.seek(0, 2)
         file.write(b"\n" + text[1])
     tracemalloc.start()

@@ -120,7 +120,7 @@ def full_disk(path: Path) -> Generator[None]:
 def remove_unfinished(folder: Path) -> None:
     """Removes what killed writers left in a folder; call only while nobody writes there."""
     for path in folder.iterdir():
-        if _TEMPORARY.fullmatch(path.name):
+        if _TEMPORARY.fullmatch(path.name) and (path.is_symlink() or path.is_file()):
             path.unlink()
 
 

@@ -194,7 +194,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         async with room.lock(name):
             person = room.people.person(name)
             if id != CONSENT:
-                person.check_spoken()
+                await asyncio.to_thread(person.check_spoken)
             room.people.check_room()
             size = await asyncio.to_thread(person.append, id, take, offset, data)
         return JSONResponse({"size": size})
@@ -222,7 +222,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
 
     @app.get(part)
     async def play(name: str, id: str) -> Response:
-        found = room.people.person(name).part(id)
+        found = await asyncio.to_thread(room.people.person(name).part, id)
         if found is None:
             raise Refused("part", "this part is not recorded.", 404)
         kind = TYPES.get(found.file.suffix, "video/webm")

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import MOST_NOTES, check_left, write_atomic
 from ico3d.common.typed import loose_json
 
-METRICS = "metrics.jsonl"
+METRICS, BOARD = "metrics.jsonl", "tensorboard"
 TAIL = 4096
 """Bytes at the end of a metrics file that are certain to contain a complete entry."""
 
@@ -31,15 +31,20 @@ class MetricsLog:
     """
 
     def __init__(self, folder: Path, first_step: int):
-        """Opens the files in `folder` and removes entries from `first_step` on."""
+        """Opens the files in `folder` and removes entries from `first_step` on.
+
+        Raises:
+            StorageError: If the disk is nearly full.
+        """
         logging.getLogger("tensorboard").setLevel(logging.ERROR)
         from torch.utils.tensorboard import SummaryWriter
 
         path = folder / METRICS
+        check_left(folder, path, _size(path))
         # In one piece: a run killed right here must not lose what earlier ones wrote.
         write_atomic(path, lambda temporary: _copy_before(path, first_step, temporary))
         self._file = path.open("a")
-        self._board = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step)
+        self._board = SummaryWriter(str(folder / BOARD), purge_step=first_step)
 
     def write(self, step: int, values: Mapping[str, float]) -> None:
         """Appends the values of one step."""
@@ -60,12 +65,20 @@ def _copy_before(path: Path, step: int, target: Path) -> None:
     What a disk has damaged is dropped: no training depends on it.
     """
     with target.open("wb") as written:
-        if not path.is_file():
+        size = _size(path)
+        if not size:
             return
         with path.open("rb") as file:
+            if file.seek(max(path.stat().st_size - size, 0)):
+                file.readline(LONGEST_LINE)
             while line := file.readline(LONGEST_LINE):
                 if line.endswith(b"\n") and _is_before(line, step):
                     written.write(line)
+
+
+def _size(path: Path) -> int:
+    """Bytes at the end of a metrics file that are kept; of what a link leads to, none."""
+    return 0 if path.is_symlink() or not path.is_file() else min(path.stat().st_size, MOST_NOTES)
 
 
 def _is_before(line: bytes, step: int) -> bool:

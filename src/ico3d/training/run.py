@@ -11,7 +11,7 @@ from torch import Tensor
 from ico3d.common.files import json_of, remove_unfinished, write_atomic
 from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import check_seal, load_sealed, load_state, save_sealed
-from ico3d.training.log import is_step
+from ico3d.training.log import BOARD, is_step
 from ico3d.training.notes.lock import locked
 from ico3d.training.notes.state import begun, ended, note
 
@@ -65,7 +65,8 @@ class RunFolder:
         Raises:
             SettingsError: If the folder holds a run with other settings, or another process works
                 at it.
-            ModelError: If the folder's settings are damaged.
+            ModelError: If the folder's settings are damaged, or something else lies where the run
+                writes.
         """
         self.path = path
         self.settings = json.loads(json.dumps(settings))
@@ -80,8 +81,17 @@ class RunFolder:
             self._drop_checkpoints()  # killed after that was written
             return
         self._lock = locked(file)
+        self._check_files()
         remove_unfinished(path)
         begun(path)
+
+    def _check_files(self) -> None:
+        """Raises ModelError if a folder lies in the place of a file, or a file in that of one."""
+        for one in self.path.iterdir():
+            if one.is_dir() and one.suffix in (".json", ".jsonl", ".safetensors"):
+                raise ModelError(f"{one} is a folder in the place of a file: move it away.")
+        if (board := self.path / BOARD).exists() and not board.is_dir():
+            raise ModelError(f"{board} is a file in the place of a folder: move it away.")
 
     def _check_same(self, earlier: dict) -> None:
         """Raises SettingsError if the folder's run was started with other settings."""

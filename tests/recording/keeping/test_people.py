@@ -192,3 +192,14 @@ def test_whose_files_lie_behind_a_link_is_nobody_and_is_not_named(tmp_path, plac
     assert People(tmp_path).names() == [ada.name]
     with pytest.raises(Refused, match="nothing is recorded of Ida"):
         People(tmp_path).person("Ida")
+
+
+def test_of_a_folder_of_thousands_some_are_looked_at(tmp_path, monkeypatch):
+    begun(tmp_path)
+    people = People(tmp_path)
+    looked = []
+    monkeypatch.setattr(room, "MOST_ENTRIES", 20)
+    monkeypatch.setattr(People, "_is_here", lambda self, name: looked.append(name) or False)
+    for number in range(100):
+        (people.folder / f"n{number}").mkdir()
+    assert people.names() == [] and len(looked) <= 20

@@ -178,3 +178,17 @@ def test_what_lies_elsewhere_is_not_read(person):
         assert not list(person.parts())
     (part,) = person.parts()
     assert part.report["turn"] == 0.3
+
+
+def test_thousands_of_files_are_not_looked_through(person, monkeypatch):
+    monkeypatch.setattr(room, "MOST_FILES", 50)
+    (person.folder / room.PARTS).mkdir()
+    for number in range(200):
+        (person.folder / room.PARTS / f"x{number}").touch()
+    matched = []
+    real = room.fnmatch.fnmatchcase
+    monkeypatch.setattr(room.fnmatch, "fnmatchcase", lambda *a: matched.append(1) or real(*a))
+    person.part("left")
+    assert 0 < len(matched) <= 2 * 50  # kept ones, then takes
+    (person.folder / room.PARTS / "left.folder").mkdir()
+    person.remove("left")

@@ -219,6 +219,16 @@ def test_a_server_starts_whatever_lies_in_somebodys_folder(people, makers, monke
     def full(*_):
         raise StorageError("the disk is full.")
 
+    def refused(*_):
+        raise PermissionError(13, "Permission denied")
+
+    ada = people.person("Ada")
+    ada.remove("consent")  # so that it is stopped
+    Places(ada.folder).folder.mkdir()
+    write_progress(Places(ada.folder).folder, Progress("running", "good"))
+    monkeypatch.setattr(room, "write_progress", refused)
+    makers.go_on()
+    assert "Ada is not gone on with" in caplog.text
     (ida / "log.txt").rmdir()
     monkeypatch.setattr(room, "write_progress", full)
     makers.go_on()

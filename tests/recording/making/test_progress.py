@@ -92,6 +92,7 @@ def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
 
 
 ODD_PAIRS = [('"running"', text) for text in ("5", "null", '["x"]', '"better"', "{}")]
+DEEP = "[" * 700 + "]" * 700
 ODD_PAIRS += [(text, '"good"') for text in ("5", "null", '["x"]', '"going"')]
 
 
@@ -101,6 +102,15 @@ def test_what_is_damaged_is_nothing(tmp_path):
     odd = [whole % ("made_of", "3"), whole % ("decibels", "Infinity"), "[" * 100_000]
     odd += [whole % ("advice", "[" + "[]," * 30_000 + "[]]")]
     odd += [f'{{"state": {state}, "quality": {quality}}}' for state, quality in ODD_PAIRS]
+    odd += [
+        whole % (name, DEEP) for name in ("error", "faces", "advice", "values", "step", "share")
+    ]
+    odd += [whole % (name, '"nan"') for name in ("left", "later", "told", "share", "decibels")]
+    odd += [
+        whole % ("faces", "-1"),
+        whole % ("error", "[]"),
+        whole % ("made_of", f'{{"x": {DEEP}}}'),
+    ]
     odd += [whole % ("told", '"x"'), whole % ("left", "[]"), whole % ("later", "9" * 400)]
     for text in ("{", "[]", '{"state": "running"}', '{"advice": [], "x": 1}', *odd):
         (tmp_path / "progress.json").write_text(text)

@@ -33,6 +33,21 @@ def test_an_avatar_has_one_server_until_it_is_stopped(avatar):
     assert process.poll() is not None
 
 
+def test_few_talk_at_once_and_the_one_asked_for_longest_ago_ends(avatar, monkeypatch):
+    monkeypatch.setattr(talks, "MOST", 2)
+    serving, files = Talks("127.0.0.1", False), [avatar]
+    for name in ("Ada", "Eve"):
+        files.append(avatar.with_name(f"{name}.ico3d"))
+        files[-1].write_text(name)
+    urls = [serving.url(file) for file in files[:2]]
+    assert serving.url(avatar) == urls[0]  # is asked for again
+    (ada, _), (ida, _) = serving._running["Ada"], serving._running["Ida"]
+    serving.url(files[2])
+    assert list(serving._running) == ["Ida", "Eve"]
+    assert ada.poll() is not None and ida.poll() is None
+    serving.close()
+
+
 def test_a_talk_that_speaks_on_is_ended_and_holds_up_nobody(avatar, monkeypatch):
     serving, slow = Talks("127.0.0.1", False), avatar.with_name("Slow.ico3d")
     slow.write_text("Stubborn")

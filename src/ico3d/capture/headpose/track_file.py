@@ -12,7 +12,7 @@ from safetensors.numpy import save
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding
 from ico3d.common.expression import EYE_NAMES
-from ico3d.common.files import MOST_NOTES, read_small, write_atomic
+from ico3d.common.files import MOST_NOTES, read_small, write_one_of_many
 from ico3d.common.unpacking.heads import load_bounded
 from ico3d.errors import CaptureError
 
@@ -73,7 +73,7 @@ class HeadTrack:
         arrays = {f.name: np.ascontiguousarray(getattr(self, f.name)) for f in fields(self)}
         file = track_file(recording)
         try:
-            write_atomic(file, save(arrays))
+            write_one_of_many(file, save(arrays))
         except OSError as error:
             raise _unwritable(recording, error.strerror) from error
         return file

@@ -1,6 +1,10 @@
 """What is recorded of one person: parts that grow while they are recorded, and the kept ones."""
 
+import contextlib
+import fnmatch
+import itertools
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +26,9 @@ TICKED, TICKED_AND_SPOKEN = ", ticked: ", ", ticked and spoken: "
 """How a person agreed, as their consent says it."""
 VOICE_CONSENT = "voice_consent"
 """Entry of the consent of those who agreed that their voice is cloned, too."""
+MOST_FILES = 1000
+"""Files of the parts that are looked at; a recording has some dozens, and each page asks for them
+again and again."""
 UNSEEN: dict[str, Any] = {"seconds": 0.0, "turn": None, "advice": []}
 """What is said of a part of which nobody knows what was found in it."""
 MOST_TAKES = 4
@@ -84,17 +91,18 @@ class Person:
 
     def parts(self) -> Iterator[Part]:
         """All parts, kept ones and those whose recording broke off."""
-        for id in sorted(ALL_IDS):
-            kept = self._kept(id)
-            if kept is not None:
-                yield Part(id, kept, "", self._report(id))
-            elif takes := self._takes(id):
-                largest = max(takes, key=lambda file: file.stat().st_size)
-                yield Part(id, largest, largest.name.split(".")[1], None)
+        yield from filter(None, map(self.part, sorted(ALL_IDS)))
 
     def part(self, id: str) -> Part | None:
         """One part; None where nothing of it was recorded."""
-        return next((one for one in self.parts() if one.id == checked_id(id)), None)
+        kept = self._kept(checked_id(id))
+        if kept is not None:
+            return Part(id, kept, "", self._report(id))
+        takes = self._takes(id)
+        if not takes:
+            return None
+        largest = max(takes, key=lambda file: file.stat().st_size)
+        return Part(id, largest, largest.name.split(".")[1], None)
 
     def append(self, id: str, take: str, offset: int, data: bytes) -> int:
         """Adds bytes to a take; those that it has already are taken as repeated.
@@ -168,7 +176,8 @@ class Person:
     def remove(self, id: str) -> None:
         """Removes a part, its takes and what was found in it."""
         for file in self._parts.glob(f"{checked_id(id)}.*"):
-            file.unlink()
+            if file.is_symlink() or not file.is_dir():
+                file.unlink()
         if id == CONSENT:
             self._state(TICKED_AND_SPOKEN, TICKED)
 
@@ -198,8 +207,11 @@ class Person:
 
     def _files(self, pattern: str) -> Iterator[Path]:
         """Files of the parts; what a link leads to may be anything of this machine."""
-        found = self._parts.glob(pattern)
-        return (file for file in found if file.is_file() and not file.is_symlink())
+        with contextlib.suppress(FileNotFoundError), os.scandir(self._parts) as entries:
+            for entry in itertools.islice(entries, MOST_FILES):
+                fits = fnmatch.fnmatchcase(entry.name, pattern)
+                if fits and entry.is_file(follow_symlinks=False):
+                    yield self._parts / entry.name
 
     def _make_room(self, id: str) -> None:
         for old in self._takes(id)[: -(MOST_TAKES - 1)]:

@@ -211,15 +211,19 @@ class Makers:
     def go_on(self) -> None:
         """Goes on with what was being made when the server ended."""
         for name in self._people.names():
-            person = self._people.person(name)
-            found = read_progress(Places(person.folder).folder)
-            if found is not None and found.state == "running":
-                try:
-                    self.begin(person, found.quality)
-                except Refused:
-                    self.stop(person)  # another one came first: its turn is when somebody asks
-                except (Ico3dError, OSError) as error:  # a full disk, or strange files
-                    _log.warning("The avatar of %s is not gone on with: %s", name, error)
+            try:
+                self._go_on(self._people.person(name))
+            except (Ico3dError, OSError, ValueError) as error:  # a full disk, or strange files
+                _log.warning("The avatar of %s is not gone on with: %s", name, error)
+
+    def _go_on(self, person: Person) -> None:
+        found = read_progress(Places(person.folder).folder)
+        if found is None or found.state != "running":
+            return
+        try:
+            self.begin(person, found.quality)
+        except Refused:
+            self.stop(person)  # another one came first: its turn is when somebody asks
 
     def close(self) -> None:
         """Ends all processes; what they made is gone on with at the next start."""

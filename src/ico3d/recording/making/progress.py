@@ -1,6 +1,7 @@
 """How far an avatar is, in a file that the page is shown and that outlives every process."""
 
 import json
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,8 @@ from ico3d.recording.making.estimate import Estimate
 
 FILE, FACE = "progress.json", "face.jpg"
 State = Literal["running", "stopped", "failed", "made"]
+DEEPEST, MOST_FACES = 8, 10**6
+"""How deep lists and objects lie in one another at most, and how many pictures a making shows."""
 OFTEN = 1.0
 """Seconds between two writings, where nothing but a share has changed."""
 
@@ -87,14 +90,35 @@ def read_progress(folder: Path) -> Progress | None:
     """The progress in a folder; None where nothing was begun."""
     try:
         found = Progress(**noted(folder / FILE))
-        if found.state not in get_args(State) or found.quality not in get_args(QualityName):
+        if not _is_sound(found):
             return None
         left = None if found.left is None else float(found.left)
         numbers = {"left": left, "later": float(found.later), "told": float(found.told)}
         lists = {"advice": tuple(found.advice), "refused": tuple(found.refused)}
+        if not all(math.isfinite(number or 0.0) for number in numbers.values()):
+            return None
         return replace(found, made_of=dict(found.made_of), **numbers, **lists)
     except (OSError, ValueError, TypeError, KeyError, OverflowError):
         return None
+
+
+def _is_sound(found: Progress) -> bool:
+    """Whether all is of its kind in what was read, but for numbers: it may be a stranger's."""
+    known = found.state in get_args(State) and found.quality in get_args(QualityName)
+    texts = all(isinstance(text, str) for text in (found.step, found.error, found.code))
+    share = isinstance(found.share, (int, float)) and 0 <= found.share <= 1
+    counted = isinstance(found.faces, int) and 0 <= found.faces <= MOST_FACES
+    good = found.decibels is None or isinstance(found.decibels, (int, float))
+    parts = (found.advice, found.refused, found.values, found.made_of)
+    return known and texts and share and counted and good and all(map(_is_shallow, parts))
+
+
+def _is_shallow(value: object, levels: int = DEEPEST) -> bool:
+    """Whether lists and objects lie in one another no deeper than in what is written here."""
+    if not isinstance(value, (list, tuple, dict)):
+        return True
+    inside = value.values() if isinstance(value, dict) else value
+    return levels > 0 and all(_is_shallow(one, levels - 1) for one in inside)
 
 
 def begun(folder: Path, quality: QualityName, made_of: dict[str, Any] | None = None) -> Progress:

@@ -10,12 +10,14 @@ from ico3d.recording.beside import start, stop
 from ico3d.recording.refusals import Refused
 
 TALK = "ico3d.recording.making.talk"
+MOST = 4
+"""Servers at once, of 150 MB each; of more, the one that was asked for longest ago ends."""
 PATIENCE = 0.5
 """Seconds in which a talk may end by itself: the sentence at hand would take longer."""
 
 
 class Talks:
-    """Servers of finished avatars, as `ico3d serve` starts them, one for each."""
+    """Servers of finished avatars, as `ico3d serve` starts them, one for each, and few at once."""
 
     def __init__(self, host: str, tls: bool):
         """Serves on the address `host`, by HTTPS if wanted."""
@@ -32,15 +34,23 @@ class Talks:
         if not avatar.is_file():
             raise Refused("unmade", "the avatar is not made yet.", 409)
         with self._lock:
-            process, url = self._running.get(avatar.stem, (None, ""))
-            if process is not None and process.poll() is None:
-                return url
-            process = start(TALK, [str(avatar), *self._words], subprocess.PIPE)
-            self._running[avatar.stem] = process, (url := _read_url(process))
-            if not url:
-                stop(process)
-                raise Refused("silent", f"the avatar cannot talk: ico3d serve {avatar.name}.", 500)
-            return url
+            process, url = self._running.pop(avatar.stem, (None, ""))
+            if process is None or process.poll() is not None:
+                process, url = self._started(avatar)
+            self._running[avatar.stem] = process, url  # the one that was asked for last is the last
+            over = list(self._running)[:-MOST]
+        for name in over:
+            self.stop(name)
+        return url
+
+    def _started(self, avatar: Path) -> tuple[subprocess.Popen[bytes], str]:
+        """A new server, with its address."""
+        process = start(TALK, [str(avatar), *self._words], subprocess.PIPE)
+        url = _read_url(process)
+        if not url:
+            stop(process)
+            raise Refused("silent", f"the avatar cannot talk: ico3d serve {avatar.name}.", 500)
+        return process, url
 
     def stop(self, name: str) -> None:
         """Ends the server of somebody's avatar, if there is one."""
