@@ -10,6 +10,7 @@ import pytest
 from safetensors.torch import load_file
 
 from ico3d.errors import StorageError
+from ico3d.head import model
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.training.processes import fork_server
 from ico3d.training.run import BEFORE, CHECKPOINT
@@ -107,7 +108,9 @@ def test_the_papers_settings_are_killed_and_give_the_same_head_bit_for_bit(
     }
 
 
-def test_a_head_goes_on_after_a_full_disk_and_after_a_damaged_checkpoint(tiny, tmp_path, caplog):
+def test_a_head_goes_on_after_a_full_disk_and_after_a_damaged_checkpoint(
+    tiny, tmp_path, caplog, monkeypatch
+):
     few = {"steps": 16, "checkpoint_every": 4, "initial.gaussians": 100}
     job = HeadJob("blendshapes", "full", "builtin", 0, changed(SETTINGS, few))
     train_head(tiny, tmp_path / "whole", job)
@@ -119,15 +122,19 @@ def test_a_head_goes_on_after_a_full_disk_and_after_a_damaged_checkpoint(tiny, t
     ):
         train_head(tiny, parts, job)
     assert not (parts / CHECKPOINT).exists() and not list(parts.glob(".*"))
-    (parts / "model.safetensors").mkdir()  # so that writing the model fails, after all steps
-    with pytest.raises(OSError, match="directory"):
-        train_head(tiny, parts, job)
-    (parts / "model.safetensors").rmdir()
-    assert (parts / BEFORE).is_file()
+    with monkeypatch.context() as patched:  # so that writing the model fails, after all steps
+        patched.setattr(model, "save_tensors", _fail)
+        with pytest.raises(StorageError, match="full when the model is written"):
+            train_head(tiny, parts, job)
+    assert (parts / BEFORE).is_file() and not (parts / "model.safetensors").exists()
     (parts / CHECKPOINT).write_bytes((parts / CHECKPOINT).read_bytes()[:-1])
     train_head(tiny, parts, job)
     assert "Training goes on from the checkpoint before, at step 8." in caplog.text
     assert (parts / "model.safetensors").read_bytes() == whole
+
+
+def _fail(*_):
+    raise StorageError("the disk is full when the model is written.")
 
 
 def _assert_tidy(folder: Path) -> None:
