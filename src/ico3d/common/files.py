@@ -1,6 +1,7 @@
 """Writes files so that a crash never leaves half of one; finds and reads small ones of anybody."""
 
 import errno
+import itertools
 import os
 import re
 import secrets
@@ -70,15 +71,26 @@ def write_atomic(
         temporary.unlink(missing_ok=True)
 
 
-def write_one_of_many(path: Path, write: Callable[[Path], None] | bytes) -> None:
-    """Writes a file as `write_atomic`, of as many as a stranger's recording may ask for.
+def write_one_of_many(
+    path: Path,
+    write: Callable[[Path], None] | bytes,
+    size: int = 0,
+    before: Path | None = None,
+) -> None:
+    """Writes a file as `write_atomic`, of as many or as large as a stranger's files may ask for.
+
+    Args:
+        path: The file to write; its folder is made where missing.
+        write: As for `write_atomic`.
+        size: Bytes that a function will write, where that is known.
+        before: As for `write_atomic`.
 
     Raises:
-        StorageError: If less than `SPARE` bytes of the disk are left, or it is full.
+        StorageError: If less than these and `SPARE` bytes of the disk are left, or it is full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    check_left(path.parent, path, len(write) if isinstance(write, bytes) else 0)
-    write_atomic(path, write)
+    check_left(path.parent, path, len(write) if isinstance(write, bytes) else size)
+    write_atomic(path, write, before)
 
 
 def check_left(folder: Path, written: Path, size: int = 0) -> None:
@@ -187,6 +199,15 @@ def check_regular(file: Path) -> None:
     """
     if file.exists() and not file.is_file():
         raise OSError(f"{file} is no regular file")
+
+
+def first_entries(folder: Path, most: int) -> list[os.DirEntry[str]]:
+    """The first entries of a folder, which may be anybody's; none where there is no folder."""
+    try:
+        with os.scandir(folder) as entries:
+            return list(itertools.islice(entries, most))
+    except FileNotFoundError:
+        return []
 
 
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:

@@ -12,7 +12,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 
-from ico3d.common.files import check_left, write_atomic
+from ico3d.common.files import write_one_of_many
 from ico3d.common.typed import loose_json
 from ico3d.common.unpacking.heads import check_head
 from ico3d.common.unpacking.memory import lacks_room
@@ -70,8 +70,8 @@ def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None
     Raises:
         StorageError: If the disk is full, or would nearly be; a file that was there before is kept.
     """
-    _make_room(path, tensors)
-    write_atomic(path, lambda temporary: _stream(temporary, tensors, {}, state))
+    size = size_of_tensors(tensors)
+    write_one_of_many(path, lambda temporary: _stream(temporary, tensors, {}, state), size)
 
 
 def save_sealed(
@@ -96,14 +96,7 @@ def save_sealed(
             file.seek(8 + len(_SEALED))
             file.write(found)
 
-    _make_room(path, tensors)
-    write_atomic(path, write, before)
-
-
-def _make_room(path: Path, tensors: Mapping[str, Tensor]) -> None:
-    """Makes a file's folder, and refuses to write tensors that would nearly fill its disk."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    check_left(path.parent, path, size_of_tensors(tensors))
+    write_one_of_many(path, write, size_of_tensors(tensors), before)
 
 
 def size_of_tensors(tensors: Mapping[str, Tensor]) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ico3d.common.files import MOST_NOTES, check_left, write_atomic
+from ico3d.common.files import MOST_NOTES, write_one_of_many
 from ico3d.common.typed import loose_json
 
 METRICS, BOARD = "metrics.jsonl", "tensorboard"
@@ -40,9 +40,9 @@ class MetricsLog:
         from torch.utils.tensorboard import SummaryWriter
 
         path = folder / METRICS
-        check_left(folder, path, _size(path))
+        size = _size(path)
         # In one piece: a run killed right here must not lose what earlier ones wrote.
-        write_atomic(path, lambda temporary: _copy_before(path, first_step, temporary))
+        write_one_of_many(path, lambda to: _copy_before(path, size, first_step, to), size)
         self._file = path.open("a")
         self._board = SummaryWriter(str(folder / BOARD), purge_step=first_step)
 
@@ -59,13 +59,12 @@ class MetricsLog:
         self._board.close()
 
 
-def _copy_before(path: Path, step: int, target: Path) -> None:
-    """Writes the whole lines of a metrics file that belong to earlier steps, one by one.
+def _copy_before(path: Path, size: int, step: int, target: Path) -> None:
+    """Writes the whole lines in the last bytes of a metrics file that belong to earlier steps.
 
     What a disk has damaged is dropped: no training depends on it.
     """
     with target.open("wb") as written:
-        size = _size(path)
         if not size:
             return
         with path.open("rb") as file:

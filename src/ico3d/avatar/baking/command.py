@@ -194,8 +194,7 @@ class Bake:
             check()
             person_bundle.check(result)
             animation = _played(animation, report)
-        to = self._out
-        manifest = person_bundle.write(to, avatar, result, animation, body_capture, about)
+        manifest = person_bundle.write(self._out, avatar, result, animation, body_capture, about)
         report(head_bundle.eyes_in_words(manifest))
 
     def _capture(self, index: int) -> "Capture | None":

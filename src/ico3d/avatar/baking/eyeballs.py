@@ -7,7 +7,7 @@ from scipy.spatial import Delaunay
 
 from ico3d.avatar.staging import triple
 from ico3d.bundle.evaluate import attributes, centres
-from ico3d.bundle.head import BakedHead, no_displacements
+from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import GazeInfo
 from ico3d.common.expression import EYE_UNIT, MOST_DISPLACEMENTS
 from ico3d.common.spread import spread
@@ -95,8 +95,6 @@ def with_turning_eyes(
 
 def with_still_eyes(head: BakedHead) -> BakedHead:
     """The head without the two displacements that `with_turning_eyes` adds."""
-    if head.num_displacements == 2:
-        return replace(head, **no_displacements(head.num_gaussians, head.expression_size))
     return replace(
         head,
         displacement_basis=head.displacement_basis[:-2],
@@ -184,8 +182,6 @@ def _grown(outline: np.ndarray, by: float) -> np.ndarray:
 def _with_displacements(head: BakedHead, turns: np.ndarray) -> BakedHead:
     """The head with further displacements (M, N, 3), metres per radian, which no network moves."""
     values = np.round(turns / EYE_UNIT).astype(np.int8)
-    if not head.num_displacements:
-        head = replace(head, **no_displacements(head.num_gaussians, head.expression_size))
     none = np.zeros((head.displacement_w2.shape[0], len(turns)), np.float32)
     return replace(
         head,

@@ -13,6 +13,7 @@ from ico3d.avatar.baking.eyeballs import with_turning_eyes
 from ico3d.avatar.baking.samples import Samples
 from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.baking.telling.about import About
+from ico3d.avatar.joining.similarity import moved
 from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.head import SHOULDERS, BakedHead, BakedShoulders, poses_to_bytes
@@ -250,9 +251,7 @@ def finished(
         idle: (B,) expression at rest.
         placed: (4, 4) similarity from the space of the exact head to that of the baked one.
     """
-    marks = head.landmarks
-    if marks is not None:
-        marks = marks @ placed[:3, :3].T + placed[:3, 3]  # (68, 3)
+    marks = None if head.landmarks is None else moved(placed, head.landmarks)  # (68, 3)
     return with_turning_eyes(driven(baked, head), idle, marks)
 
 

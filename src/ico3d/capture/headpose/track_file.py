@@ -69,6 +69,7 @@ class HeadTrack:
 
         Raises:
             CaptureError: If the recording's folder is not writable.
+            StorageError: If the disk has no room for it and some more.
         """
         arrays = {f.name: np.ascontiguousarray(getattr(self, f.name)) for f in fields(self)}
         file = track_file(recording)

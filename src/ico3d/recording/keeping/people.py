@@ -1,10 +1,7 @@
 """The folder of all recordings: whose there are, and how one begins."""
 
-import contextlib
-import itertools
 import json
 import logging
-import os
 import re
 import secrets
 import shutil
@@ -14,7 +11,7 @@ from pathlib import Path
 
 from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
-from ico3d.common.files import write_atomic
+from ico3d.common.files import first_entries, write_atomic
 from ico3d.common.people.spelling import spelled
 from ico3d.creating.settings import OWN_USE
 from ico3d.errors import SettingsError
@@ -51,9 +48,7 @@ class People:
 
     def names(self) -> list[str]:
         """Whose recordings there are, sorted."""
-        found: list[str] = []
-        with contextlib.suppress(FileNotFoundError), os.scandir(self.folder) as entries:
-            found = [entry.name for entry in itertools.islice(entries, MOST_ENTRIES)]
+        found = [entry.name for entry in first_entries(self.folder, MOST_ENTRIES)]
         return sorted(name for name in found if is_name(name) and self._is_here(name))
 
     def person(self, name: str) -> Person:

@@ -1,16 +1,13 @@
 """What is recorded of one person: parts that grow while they are recorded, and the kept ones."""
 
-import contextlib
 import fnmatch
-import itertools
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import first_entries, write_atomic
 from ico3d.recording.keeping.containers import HEAD, suffix_of
 from ico3d.recording.keeping.noted import noted
 from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD, scripts
@@ -207,11 +204,10 @@ class Person:
 
     def _files(self, pattern: str) -> Iterator[Path]:
         """Files of the parts; what a link leads to may be anything of this machine."""
-        with contextlib.suppress(FileNotFoundError), os.scandir(self._parts) as entries:
-            for entry in itertools.islice(entries, MOST_FILES):
-                fits = fnmatch.fnmatchcase(entry.name, pattern)
-                if fits and entry.is_file(follow_symlinks=False):
-                    yield self._parts / entry.name
+        for entry in first_entries(self._parts, MOST_FILES):
+            fits = fnmatch.fnmatchcase(entry.name, pattern)
+            if fits and entry.is_file(follow_symlinks=False):
+                yield self._parts / entry.name
 
     def _make_room(self, id: str) -> None:
         for old in self._takes(id)[: -(MOST_TAKES - 1)]:

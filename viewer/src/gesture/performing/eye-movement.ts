@@ -2,6 +2,7 @@ import { Quaternion, Vector3, type Object3D } from 'three';
 import type { GazeInfo } from '../../bundle/manifest.ts';
 import { smooth } from '../../face/idle.ts';
 import type { Looker } from '../../head/head.ts';
+import { clamp } from '../../motion/glide.ts';
 import type { StateMessage } from '../../protocol.ts';
 import { Attention } from './attention.ts';
 import { directionTo } from './gaze.ts';
@@ -65,7 +66,8 @@ export class EyeMovement implements Looker {
     const [yaw, pitch] = directionTo(this.gaze.eyes, seen.toArray());
     const past = this.attention.at(this.now);
     const [aside, down] = this.beside();
-    const turned: Beside = [clamp(yaw + aside + past.yaw, this.gaze.most[0]), clamp(pitch + down + past.pitch, this.gaze.most[1])];
+    const [sides, up] = this.gaze.most;
+    const turned: Beside = [clamp(yaw + aside + past.yaw, -sides, sides), clamp(pitch + down + past.pitch, -up, up)];
     if (turned.every((angle, i) => Math.abs(angle - this.shown[i]!) < LEAST)) return null;
     return (this.shown = turned);
   }
@@ -98,8 +100,4 @@ export class EyeMovement implements Looker {
   private between([least, most]: readonly number[]): number {
     return least! + (most! - least!) * this.random();
   }
-}
-
-function clamp(angle: number, most: number): number {
-  return Math.min(Math.max(angle, -most), most);
 }

@@ -1,3 +1,4 @@
+import { clamp } from '../../motion/glide.ts';
 import { multiply, subtract, type Quat, type Vector } from '../../rig/quaternions.ts';
 import { about } from '../turning.ts';
 import type { Bearing } from './attention.ts';
@@ -32,7 +33,7 @@ class Hinge {
   step(target: number): void {
     const pull = this.stiff * this.stiff * (target - this.angle) - 2 * this.stiff * this.speed;
     const most = this.stiff * this.fastest;
-    this.speed = clamp(this.speed + TICK * clamp(pull, most), this.fastest);
+    this.speed = clamp(this.speed + TICK * clamp(pull, -most, most), -this.fastest, this.fastest);
     this.angle += TICK * this.speed;
   }
 }
@@ -74,8 +75,8 @@ export class Gaze {
     const beyond = Math.max(Math.abs(this.yaw) - CHEST_FROM, 0) * CHEST_PART;
     this.chest.step(Math.sign(this.yaw) * Math.min(beyond, CHEST_YAW));
     // The face, not the neck, follows: it stays on the visitor while the chest catches up.
-    this.face.step(this.chest.angle + clamp(this.yaw - this.chest.angle, HEAD_YAW));
-    this.nod.step(clamp(this.pitch, HEAD_PITCH));
+    this.face.step(this.chest.angle + clamp(this.yaw - this.chest.angle, -HEAD_YAW, HEAD_YAW));
+    this.nod.step(clamp(this.pitch, -HEAD_PITCH, HEAD_PITCH));
     this.lean.step(this.tilt);
   }
 }
@@ -84,8 +85,4 @@ export class Gaze {
 export function directionTo(point: Vector, visitor: Vector): [number, number] {
   const [x, y, z] = subtract(visitor, point);
   return [Math.atan2(x, z), -Math.atan2(y, Math.sqrt(x * x + z * z))];
-}
-
-function clamp(value: number, most: number): number {
-  return Math.min(Math.max(value, -most), most);
 }
