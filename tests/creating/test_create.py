@@ -192,20 +192,29 @@ def test_it_goes_on_where_it_was_stopped(tracked, settings, capfd):
     assert first == 9 / 12
 
 
-def test_what_an_earlier_version_began_is_learnt_anew(tracked, settings, monkeypatch):
+@pytest.mark.parametrize("linked", [False, True])
+def test_what_an_earlier_version_began_is_learnt_anew(
+    linked, tracked, settings, monkeypatch, tmp_path
+):
     def stop_at(event):
         if isinstance(event, Preview):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         create(settings, stop_at)
+    begun = settings.out.with_suffix(".work") / f"head-{settings.quality}"
+    elsewhere = tmp_path / "elsewhere"
+    if linked:
+        begun.rename(elsewhere)
+        begun.symlink_to(elsewhere)
     newer = Quality("exact", 22, True, replace(HEAD, steps=13))
     monkeypatch.setitem(QUALITIES, settings.quality, newer)
     told = []
     create(settings, told.append)
     assert len(tracked) == 1  # its tracking counts
     assert next(e.share for e in told if isinstance(e, Advanced) and e.step == "learn") == 1 / 13
-    assert settings.out.is_file()
+    assert settings.out.is_file() and not begun.is_symlink()
+    assert not linked or any(elsewhere.iterdir())  # what a link leads to is somebody else's
 
 
 def test_a_video_of_which_nothing_can_be_made(tracked, settings, monkeypatch, capfd):

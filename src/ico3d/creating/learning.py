@@ -1,6 +1,5 @@
 """Trains the head, and shows it while it learns."""
 
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -10,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ico3d.avatar.forgetting.removal import remove
 from ico3d.capture.capture import Capture
 from ico3d.creating.events import Advanced, Preview, Tell
 from ico3d.creating.settings import CreateSettings, Quality
@@ -34,11 +34,12 @@ def learn(
     Raises:
         CaptureError: If the capture lacks something that the training needs.
         ModelError: If training diverges.
+        SettingsError: If something in the folder cannot be removed.
         StorageError: If the disk is full.
     """
     job = HeadJob("speech", "full", "builtin", 0, quality.head)
     if not goes_on(folder, job.about(capture.path)):
-        shutil.rmtree(folder)
+        remove([folder])
     watched = partial(_shown, steps=quality.head.steps, tell=tell)
     return train_head(capture, folder, job, watched, settings.device)
 
