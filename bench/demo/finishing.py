@@ -1,4 +1,4 @@
-"""What is done to the packaged avatar once she is baked: arms, clothes, and the red of her skin."""
+"""What is done to the packaged avatar once she is baked: arms, clothes, the red of skin, lids."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +18,7 @@ from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
 from ico3d.bundle.skinned.lamp import POINT_UNIT
+from ico3d.common.expression import LIDS, SPEECH_SIZE
 from ico3d.rig.rig import Rig
 
 RESTS = Rest(16, 17)
@@ -45,13 +46,17 @@ REDDEST = (0.9, 1.4)
 """Joints that carry bare skin, and by how much the logit of its red exceeds those of green and blue
 at most: that of nineteen in twenty of the hands' Gaussians. Wool is blue and has none."""
 
+AWAKE = 0.1
+"""Share of the way that lids take as they close by which hers are wider open: those of the files
+hang low at rest, and people who saw her called her sleepy."""
+
 
 def write_finished(path: Path) -> None:
-    """Finishes the body of a bundle that was just baked: its arms, clothes, skin and gestures."""
+    """Finishes a bundle that was just baked: arms, clothes, skin and gestures of its body, lids."""
     bundle = Bundle.open(path)
     assert bundle.skinned is not None
     body = muted(tailored(narrower(bundle.skinned)))
-    head, gestures = bundle.require_head()[0], gesture_files(body, (), 1.0)
+    head, gestures = awake(bundle.require_head()[0]), gesture_files(body, (), 1.0)
     write_person(path, bundle, bundle.manifest, head, body, gestures)
 
 
@@ -89,6 +94,14 @@ def write_person(
     info = replace(manifest.head, num_rest=0)
     manifest = replace(manifest, head=info, skinned=replace(body.info, num_rest=0))
     write_bundle(path, *coarse_first(manifest, files))
+
+
+def awake(head: BakedHead) -> BakedHead:
+    """The head of somebody who speaks with lids that are `AWAKE`."""
+    lids = [SPEECH_SIZE + lid for lid in LIDS]
+    opened = head.b1 - AWAKE * head.w1[lids].sum(0)
+    moved = head.displacement_b1 - AWAKE * head.displacement_w1[lids].sum(0)
+    return replace(head, b1=opened, displacement_b1=moved)
 
 
 def narrower(body: BakedSkinned) -> BakedSkinned:

@@ -1,5 +1,6 @@
 """The baked head: tensors that a shader blends (docs/bundle.md, head.safetensors)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -105,6 +106,15 @@ class BakedHead:
     def chosen(self, indices: np.ndarray) -> "BakedHead":
         """The head with some of its Gaussians, by indices (M,) in the order they are to have."""
         parts = {name: self._tensors[name].take(indices, axis) for name, axis in _AXES.items()}
+        return replace(self, **parts)
+
+    def preceded(self, more: Mapping[str, np.ndarray]) -> "BakedHead":
+        """The head after further Gaussians, whose tensors are given by name in any type."""
+        parts = {
+            name: np.concatenate([more[name].astype(tensor.dtype), tensor], axis)
+            for name, axis in _AXES.items()
+            for tensor in (self._tensors[name],)
+        }
         return replace(self, **parts)
 
     def to_bytes(self) -> bytes:

@@ -9,7 +9,8 @@ import torch
 
 from ico3d.avatar import staging
 from ico3d.avatar.baking import head_cost
-from ico3d.avatar.baking.eyeballs import with_turning_eyes
+from ico3d.avatar.baking.eyes.catchlights import SHUT, with_catchlights
+from ico3d.avatar.baking.eyes.eyeballs import eyeballs_of, turned_by_gaze
 from ico3d.avatar.baking.samples import Samples
 from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.baking.telling.about import About
@@ -25,7 +26,7 @@ from ico3d.bundle.manifest import (
     SpeechInfo,
 )
 from ico3d.capture.capture import Capture
-from ico3d.common.expression import SPEECH_SIZE
+from ico3d.common.expression import EYE_NAMES, LIDS, SPEECH_SIZE
 from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.model_folder import TrainedHead
@@ -243,7 +244,7 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
 def finished(
     baked: BakedHead, head: TrainedHead, idle: np.ndarray, placed: np.ndarray
 ) -> tuple[BakedHead, GazeInfo | None]:
-    """A baked head as bundles have it: `driven`, and with eyes that turn where they are found.
+    """A baked head as bundles have it: `driven`, and where eyes are found they turn and mirror.
 
     Args:
         baked: Takes expressions as they were recorded.
@@ -252,7 +253,22 @@ def finished(
         placed: (4, 4) similarity from the space of the exact head to that of the baked one.
     """
     marks = None if head.landmarks is None else moved(placed, head.landmarks)  # (68, 3)
-    return with_turning_eyes(driven(baked, head), idle, marks)
+    drawn = driven(baked, head)
+    balls = eyeballs_of(drawn, idle, marks)
+    if not balls:
+        return drawn, None
+    return turned_by_gaze(*with_catchlights(drawn, balls, idle, _shut(head, idle)))
+
+
+def _shut(head: TrainedHead, idle: np.ndarray) -> np.ndarray:
+    """The expression at rest (B,) with lids that cover the eyes' middles."""
+    shut = idle.copy()
+    if head.adaptor is not None:
+        shut[[SPEECH_SIZE + lid for lid in LIDS]] = SHUT
+    else:
+        names = [EYE_NAMES[lid] for lid in LIDS]
+        shut[[i for i, name in enumerate(head.blendshape_names) if name in names]] = SHUT
+    return shut
 
 
 def eyes_in_words(manifest: Manifest) -> str:

@@ -9,7 +9,7 @@ import torch
 
 from ico3d.avatar import staging
 from ico3d.avatar.baked_body import SkinnedBody
-from ico3d.avatar.baking.eyeballs import with_still_eyes, with_turning_eyes
+from ico3d.avatar.baking.eyes.eyeballs import with_still_eyes, with_turning_eyes
 from ico3d.avatar.baking.person_bundle import moved_head
 from ico3d.avatar.embodying.builds.change import change_to
 from ico3d.avatar.embodying.builds.names import MEDIUM

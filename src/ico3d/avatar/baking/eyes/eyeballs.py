@@ -1,5 +1,6 @@
 """Finds the eyeballs of a baked head, so that a page can turn its eyes (docs/bundle.md)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,12 +79,21 @@ def with_turning_eyes(
         The head, and what its manifest tells of it; the head as it is, and None, where eyes are
         no balls that lids leave free, as where depth is known badly.
     """
+    balls = eyeballs_of(head, idle, landmarks)
+    return turned_by_gaze(head, balls) if balls else (head, None)
+
+
+def eyeballs_of(head: BakedHead, idle: np.ndarray, landmarks: np.ndarray | None) -> list[Eyeball]:
+    """The balls of both eyes; none where one is not found. Arguments as of `with_turning_eyes`."""
     if landmarks is None or head.num_displacements + 2 > MOST_DISPLACEMENTS:
-        return head, None
+        return []
     found = [eyeball(head, idle, landmarks[lids]) for lids in LIDS]
     balls = [ball for ball in found if ball is not None]
-    if len(balls) < len(found):
-        return head, None
+    return balls if len(balls) == len(found) else []
+
+
+def turned_by_gaze(head: BakedHead, balls: Sequence[Eyeball]) -> tuple[BakedHead, GazeInfo]:
+    """Adds two displacements that turn a head's eyes, and says what its manifest tells of them."""
     turns = np.zeros((2, head.num_gaussians, 3))  # metres per radian
     for ball in balls:
         arm = head.means[ball.own].astype(np.float64) - ball.centre  # (n, 3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ico3d.avatar.baking import eyeballs
-from ico3d.avatar.baking.eyeballs import RADIUS, with_still_eyes, with_turning_eyes
+from ico3d.avatar.baking.eyes import eyeballs
+from ico3d.avatar.baking.eyes.eyeballs import RADIUS, with_still_eyes, with_turning_eyes
 from ico3d.avatar.poseable import poseable_of
 from ico3d.avatar.render_bundle import gaze_at
 from ico3d.bundle.evaluate import centres
