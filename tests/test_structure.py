@@ -1,5 +1,6 @@
 """The house stays in order: imports go one way, folders and files stay small."""
 
+import re
 import subprocess
 from collections import Counter
 from graphlib import TopologicalSorter
@@ -64,3 +65,20 @@ def test_packed_files_are_unpacked_in_one_place(python_files):
     assert found == {
         ("common/unpacking/weights.py", "torch.load("),
     }
+
+
+def test_questions_about_files_of_anybody_have_answers(python_files):
+    """`Path.is_file` and the like raise before Python 3.14 where a link leads to a long name, in a
+    circle, or to a folder that is not ours; `os.path` has functions that say no."""
+    asked = re.compile(
+        r"(?<!os\.path)(?<!\bentry)\.(is_file|is_dir|exists|is_symlink|resolve)\b(?!`)"
+    )
+    found = {
+        f"{file}: {line.strip()}"
+        for file in python_files
+        if file.parts[0] == "src" and file.name != "http.py"  # resolves names of hosts
+        for line in (ROOT / file).read_text("utf-8").splitlines()
+        if asked.search(line)
+    }
+    assert asked.search("path.resolve()") and asked.search("map(Path.is_file, places)")
+    assert found == set()

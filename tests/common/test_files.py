@@ -14,12 +14,14 @@ from ico3d.common.files import (
     json_of,
     read_object,
     read_small,
+    remove_folder,
     remove_unfinished,
     walk,
     write_atomic,
     write_one_of_many,
 )
 from ico3d.errors import StorageError
+from support.strangers.nested import nested
 
 
 def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -118,3 +120,39 @@ def test_one_of_many_files_leaves_room_on_the_disk(tmp_path, monkeypatch):
     with pytest.raises(StorageError, match="cannot be written, as the disk is full"):
         write_one_of_many(path, b"2")
     assert path.read_bytes() == b"1"
+
+
+@pytest.mark.parametrize("longest", [files.LONGEST, 300])  # beyond, folders are moved up
+def test_a_folder_is_removed_however_deep_and_links_lead_nowhere(tmp_path, monkeypatch, longest):
+    folder, kept = tmp_path / "gone", tmp_path / "kept"
+    kept.mkdir()
+    (kept / "file").touch()
+    folder.mkdir()
+    (folder / "link").symlink_to(kept)
+    (folder / "round").symlink_to("round")
+    os.mkfifo(folder / "pipe")
+    with nested(folder):
+        deepest = max((place for place, _, _ in walk(folder)), key=lambda place: len(place.parts))
+        (deepest / "file").touch()
+        deepest.chmod(0o500)
+        monkeypatch.setattr(files, "LONGEST", longest)
+        assert remove_folder(folder) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["kept"] and (kept / "file").exists()
+
+
+def test_what_is_left_of_a_folder_is_told(tmp_path, monkeypatch):
+    folder = tmp_path / "folder"
+    (folder / "a").mkdir(parents=True)
+    (folder / "a" / "stays").touch()
+    (folder / "goes").touch()
+    unlink = os.unlink
+
+    def refuse(path):
+        if path.endswith("stays"):
+            raise PermissionError(1, "Operation not permitted")
+        unlink(path)
+
+    monkeypatch.setattr(os, "unlink", refuse)
+    assert remove_folder(folder)[0].strerror == "Operation not permitted"
+    assert [place.name for place, _, _ in walk(folder)] == ["folder", "a"]
+    assert not (folder / "goes").exists()

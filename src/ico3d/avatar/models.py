@@ -1,5 +1,6 @@
 """Opens model folders and bundles: one table tells every verb which kind a folder holds."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,14 +84,14 @@ def _kind_of(path: Path) -> Kind | None:
 
 
 def _is(path: Path, kind: Kind) -> bool:
-    return (path / kind.file).is_file() or (kind.model is Bundle and path.is_file())
+    return os.path.isfile(path / kind.file) or (kind.model is Bundle and os.path.isfile(path))
 
 
 def _refusal(path: Path, found: Kind | None, wanted: list[Kind]) -> str:
     """Error message: what the path holds, and which kinds were expected."""
     *names, last = map(str, wanted)
     expected = f"{', '.join(names)} or {last}" if names else last
-    if not path.exists():
+    if not os.path.exists(path):
         return f"there is nothing at {path}: expected {expected}."
     if found is None:
         return f"{path} holds no model that is known here: expected {expected}."

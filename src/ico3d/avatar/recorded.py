@@ -1,5 +1,6 @@
 """The recorded motion of a body on a skeleton, and `clips.toml`, which cuts it into gestures."""
 
+import os
 from pathlib import Path
 
 from ico3d.avatar.head_joint import rig_of, trained_poses
@@ -28,7 +29,7 @@ def read_cuts(folder: Path, body: TrainedBody) -> tuple[Cut, ...] | None:
         SettingsError: If the file makes no sense, or belongs to another body.
     """
     file = folder / CUTS
-    if not file.is_file():
+    if not os.path.isfile(file):
         return None
     try:
         content = read_small(file)

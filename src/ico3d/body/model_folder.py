@@ -16,7 +16,7 @@ from ico3d.body.opening import motion_from
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import Method
 from ico3d.capture.parts.trained_on import check_told
-from ico3d.common.files import json_of, write_atomic
+from ico3d.common.files import json_of, resolved, write_atomic
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import DAMAGED, load_tensors, save_tensors
@@ -156,8 +156,8 @@ class TrainedBody:
             entries = content["windows"]
             windows = tuple(Window(int(e["first"]), int(e["last"])) for e in entries)
             files = [folder / str(entry["file"]) for entry in entries]
-            found = [file.resolve() for file in files]
-            inside = [file.is_relative_to(folder.resolve()) for file in found]
+            found = [resolved(file) for file in files]
+            inside = [file.is_relative_to(resolved(folder)) for file in found]
             fps, method = float(content["fps"]), content["method"]
             summary = content["summary"]
             _check_told(windows, fps, method, summary)

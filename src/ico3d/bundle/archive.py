@@ -45,9 +45,9 @@ def open_archive(path: Path) -> Archive:
     Raises:
         BundleError: If the path does not exist, or a name, link or zip entry is refused.
     """
-    if path.is_dir():
+    if os.path.isdir(path):
         return _Folder(path)
-    if path.is_file():
+    if os.path.isfile(path):
         return _Zip(path)
     raise BundleError(f"there is no bundle at {path}.")
 
@@ -68,7 +68,7 @@ def write_zip(path: Path, files: Mapping[str, bytes]) -> None:
         _write_zip(temporary, files)
 
     try:
-        if path.exists() and not path.is_file():
+        if os.path.exists(path) and not os.path.isfile(path):
             raise BundleError(f"{path} is a folder or a device: name a file to write.")
         write_atomic(path, written)
     except OSError as error:

@@ -1,5 +1,6 @@
 """The verb `ico3d bundle info`."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -68,7 +69,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
     sizes = {name: entry.size for name, entry in manifest.files.items()}
     return {
         "name": manifest.name,
-        "bytes": path.stat().st_size if path.is_file() else sum(map(len, _contents(bundle))),
+        "bytes": path.stat().st_size if os.path.isfile(path) else sum(map(len, _contents(bundle))),
         "version": manifest.version,
         "head_gaussians": head.num_gaussians if head else None,
         "head_rank": head.rank if head else None,

@@ -1,5 +1,6 @@
 """The avatar that is part of the Python package."""
 
+import os
 from pathlib import Path
 
 import ico3d
@@ -18,7 +19,7 @@ def bundle_path(named: Path | str) -> Path:
     """
     if str(named) != NAME:
         return Path(named)
-    if not FILE.is_file():
+    if not os.path.isfile(FILE):
         raise BundleError(
             "this installation has no demo avatar (chat/data/demo.ico3d): "
             "make one with `ico3d bake` and serve it with `ico3d serve`."

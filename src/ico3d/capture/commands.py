@@ -1,5 +1,6 @@
 """The verbs `ico3d capture portrait` and `ico3d capture check`."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -79,5 +80,5 @@ class Check:
         inside = self.path / "check.png"
         report(
             open_capture(self.path),
-            self.out or (inside if self.path.is_dir() else self.path.with_suffix(".png")),
+            self.out or (inside if os.path.isdir(self.path) else self.path.with_suffix(".png")),
         )

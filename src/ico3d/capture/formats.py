@@ -1,5 +1,6 @@
 """The formats of captures; a reader is imported only when a capture of its format is opened."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,7 +60,7 @@ def _is_dna(path: Path) -> bool:
 
 def _holds(name: str) -> Callable[[Path], bool]:
     """Recognises a folder by a file in it."""
-    return lambda path: (path / name).is_file()
+    return lambda path: os.path.isfile(path / name)
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def open_capture(path: Path | str) -> Capture:
     for known in FORMATS:
         if known.recognises(path):
             return with_track(known.read(path))
-    if not path.exists():
+    if not os.path.exists(path):
         raise CaptureError(f"there is no capture at {path}.")
     *names, last = (known.name for known in FORMATS)
     raise CaptureError(

@@ -1,5 +1,6 @@
 """Reads sound files of captures."""
 
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
     """
     import soundfile
 
-    if not path.is_file():
+    if not os.path.isfile(path):
         return None
     try:
         check_claim(path, file_claim(path))

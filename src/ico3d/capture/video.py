@@ -1,5 +1,6 @@
 """Reads video files: pictures by time, and sound from the time of the first picture."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -184,7 +185,7 @@ def open_video(path: Path, size: int) -> Video:
     """
     from av.error import FFmpegError
 
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise CaptureError.of("gone", f"{path}: ")
     try:
         with opened(path) as container:

@@ -1,6 +1,7 @@
 """The verbs `ico3d serve` and `ico3d demo`."""
 
 import itertools
+import os
 import sys
 import webbrowser
 from dataclasses import dataclass, replace
@@ -124,7 +125,7 @@ class Serve:
             print("\n".join(described(parts.services, offers(settings, *voices))))
             if lost := unheard(settings.voice, *voices):
                 print(f"  the avatar has a voice of its own, which is not heard: {lost}")
-        if not (server.STATIC / "index.html").is_file():
+        if not os.path.isfile(server.STATIC / "index.html"):
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()
         if self.browser:

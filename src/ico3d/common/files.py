@@ -8,7 +8,7 @@ import secrets
 import shutil
 import stat
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -63,7 +63,7 @@ def write_atomic(
                 write(temporary)
             with temporary.open("rb") as file:
                 os.fsync(file.fileno())
-            if before is not None and path.exists():
+            if before is not None and os.path.exists(path):
                 os.replace(path, before)
             os.replace(temporary, path)
             _sync_folder(path.parent)
@@ -132,7 +132,7 @@ def full_disk(path: Path) -> Generator[None]:
 def remove_unfinished(folder: Path) -> None:
     """Removes what killed writers left in a folder; call only while nobody writes there."""
     for path in folder.iterdir():
-        if _TEMPORARY.fullmatch(path.name) and (path.is_symlink() or path.is_file()):
+        if _TEMPORARY.fullmatch(path.name) and (os.path.islink(path) or os.path.isfile(path)):
             path.unlink()
 
 
@@ -182,9 +182,14 @@ def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes
         return opened.read(about.st_size)  # room for as many bytes is made at once
 
 
+def resolved(path: Path) -> Path:
+    """As `Path.resolve`, but of anybody's links: one that leads to itself ends where it begins."""
+    return Path(os.path.realpath(path))
+
+
 def holds(file: Path, content: bytes) -> bool:
     """Whether a file, which may be anybody's, holds exactly this; False if there is none."""
-    if not file.is_file() or file.stat().st_size != len(content):
+    if not os.path.isfile(file) or file.stat().st_size != len(content):
         return False
     return file.read_bytes() == content
 
@@ -197,17 +202,71 @@ def check_regular(file: Path) -> None:
     Raises:
         OSError: If it is none.
     """
-    if file.exists() and not file.is_file():
+    if os.path.exists(file) and not os.path.isfile(file):
         raise OSError(f"{file} is no regular file")
 
 
 def first_entries(folder: Path, most: int) -> list[os.DirEntry[str]]:
-    """The first entries of a folder, which may be anybody's; none where there is no folder."""
+    """The first entries of a folder, which may be anybody's; none where it cannot be listed."""
     try:
         with os.scandir(folder) as entries:
             return list(itertools.islice(entries, most))
-    except FileNotFoundError:
+    except OSError:
         return []
+
+
+def remove_folder(folder: Path) -> list[OSError]:
+    """Removes a folder, which may be anybody's: nested as deep as you like, or not to be written.
+
+    Args:
+        folder: No link.
+
+    Returns:
+        What went wrong where something is left; what vanishes meanwhile is no fault.
+    """
+    faults: list[OSError] = []
+    waiting: list[str] = [os.fspath(folder)]
+    emptied: list[str] = []
+    while waiting:
+        place = waiting.pop()
+        emptied.append(place)
+        with suppress(OSError):  # of another user; it may go nevertheless
+            os.chmod(place, stat.S_IRWXU)
+        with _noted(faults):
+            waiting += _emptied(place, folder, faults)
+    for place in reversed(emptied):  # those within others first
+        with _noted(faults):
+            os.rmdir(place)
+    return faults if os.path.lexists(folder) else []
+
+
+def _emptied(place: str, top: Path, faults: list[OSError]) -> list[str]:
+    """Removes all but folders from a folder; the folders, of which too deep ones are moved up."""
+    folders: list[str] = []
+    with os.scandir(place) as entries:
+        listed = list(entries)
+    for entry in listed:
+        with _noted(faults):
+            if not entry.is_dir(follow_symlinks=False):
+                os.unlink(entry.path)
+            elif len(os.fsencode(entry.path)) < LONGEST:
+                folders.append(entry.path)
+            else:
+                higher = os.path.join(top, secrets.token_hex(8))
+                os.rename(entry.path, higher)
+                folders.append(higher)
+    return folders
+
+
+@contextmanager
+def _noted(faults: list[OSError]) -> Generator[None]:
+    """Notes what goes wrong, and goes on."""
+    try:
+        yield
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        faults.append(error)
 
 
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:

@@ -39,7 +39,7 @@ def find_model(name: str) -> Path | None:
     if not name or name == ".." or Path(name).name != name:
         return None
     places = (folder / name for folder in model_folders())
-    return next((place for place in places if place.exists()), None)
+    return next((place for place in places if os.path.exists(place)), None)
 
 
 def cached(name: str) -> Path | None:
@@ -62,7 +62,7 @@ def cached(name: str) -> Path | None:
     if isinstance(weights.package, FilesPackage):
         return _packaged_folder(weights.package)
     for folder in model_folders():
-        if all((folder / file.name).is_file() for file in weights.files):
+        if all(os.path.isfile(folder / file.name) for file in weights.files):
             return folder / weights.files[0].name if len(weights.files) == 1 else folder
     return None
 
@@ -117,7 +117,7 @@ def how_to_get(file: str) -> str:
 def _packaged_folder(package: FilesPackage) -> Path | None:
     """The folder of files that came out of a package, if none of them is missing."""
     for folder in model_folders():
-        if all((folder / package.folder / name).is_file() for name in package.kept):
+        if all(os.path.isfile(folder / package.folder / name) for name in package.kept):
             return folder / package.folder
     return None
 
@@ -126,7 +126,7 @@ def _repository_folder(weights: Weights) -> Path | None:
     """A repository's files, in a folder of weights or in the hub's cache."""
     must = weights.wanted[0]
     own = find_model(weights.repository.split("/")[-1])
-    if own is not None and (own / must).is_file():
+    if own is not None and os.path.isfile(own / must):
         return own
     try:
         from huggingface_hub import try_to_load_from_cache

@@ -1,6 +1,7 @@
 """Makes an avatar of a video: looks at it, tracks, learns, measures, bakes."""
 
 import json
+import os
 import time
 from functools import partial
 from pathlib import Path
@@ -115,9 +116,9 @@ def _planned(settings: CreateSettings, place: Workplace, found: Examination) -> 
     step = set_pace(settings.device)
     plans = {name: expected(one, found.seconds, step) for name, one in QUALITIES.items()}
     left = dict(plans[settings.quality])
-    if place.capture(QUALITIES[settings.quality].tracking).exists():
+    if os.path.exists(place.capture(QUALITIES[settings.quality].tracking)):
         left["track"] = 0.0
-    if (place.head(settings.quality) / "finished.json").exists():
+    if os.path.exists(place.head(settings.quality) / "finished.json"):
         left["learn"] = 0.0
     return Planned(left, {name: sum(plan.values()) for name, plan in plans.items()})
 
@@ -126,7 +127,7 @@ def _tracked(settings: CreateSettings, place: Workplace, seconds: float, tell: T
     """The tracked video, which has so many seconds."""
     quality = QUALITIES[settings.quality]
     folder = place.capture(quality.tracking)
-    if not folder.exists():
+    if not os.path.exists(folder):
         spans = tracking_spans(quality, seconds)
 
         def reached(doing: str, share: float) -> None:

@@ -4,7 +4,6 @@ import fcntl
 import hashlib
 import json
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import IO
 
 from ico3d.avatar.embodying.look import UNCHANGED
+from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.voice import VOICE as TONE
@@ -54,7 +54,7 @@ class Workplace:
 
     def is_done(self, settings: CreateSettings) -> bool:
         """Whether the avatar is there as these settings want it."""
-        return settings.out.is_file() and self.read(DONE) == _wanted(settings, settings.out)
+        return os.path.isfile(settings.out) and self.read(DONE) == _wanted(settings, settings.out)
 
     def note_done(self, settings: CreateSettings) -> None:
         """Remembers that the avatar was written."""
@@ -63,7 +63,7 @@ class Workplace:
     def voice(self, settings: CreateSettings) -> dict | None:
         """What is known of the voice that was cloned by the same consent; None where none was."""
         known = self.read(f"{VOICE}/{VOICE_ABOUT}") or {}
-        whole = isinstance(known.get("fault"), dict) or self.voice_file(TONE).is_file()
+        whole = isinstance(known.get("fault"), dict) or os.path.isfile(self.voice_file(TONE))
         return known if whole and known.get("consent") == settings.voice_consent else None
 
     def voice_file(self, name: str) -> Path:
@@ -83,7 +83,7 @@ class Workplace:
 
     def drop_voice(self) -> None:
         """Removes a cloned voice to which nobody agrees any more."""
-        shutil.rmtree(self.file(VOICE), ignore_errors=True)
+        remove([self.file(VOICE)])
 
     def read(self, name: str) -> dict | None:
         """A note that `write` left, or None."""
@@ -106,7 +106,7 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
     out, folder = settings.out, settings.out.with_suffix(".work")
     if out.suffix != ".ico3d":
         raise SettingsError(f"{out} must end in .ico3d: that is the avatar's file.")
-    if out.exists() and not (folder / ABOUT).is_file():
+    if os.path.exists(out) and not os.path.isfile(folder / ABOUT):
         raise SettingsError(f"{out} exists already: choose another name, or remove it.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -120,8 +120,7 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
             raise SettingsError.of("busy", f"{out}: ") from error
         place = Workplace(folder, _digest(settings.video))
         _check_same(place, settings)
-        for left in folder.glob(".capture-*"):
-            shutil.rmtree(left, ignore_errors=True)
+        remove(list(folder.glob(".capture-*")))
         begun(folder)
         yield place
         ended(folder)
@@ -134,7 +133,7 @@ def _own(file: Path) -> IO[bytes]:
     Raises:
         OSError: If it is a link, which may lead to any file of this machine, or a pipe.
     """
-    if not file.is_symlink():
+    if not os.path.islink(file):
         check_regular(file)
     return open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW, 0o666), "wb")
 
@@ -176,7 +175,7 @@ def _wanted(settings: CreateSettings, bundle: Path) -> dict:
 
 def _bundle_digest(bundle: Path) -> str:
     """SHA-256 that tells bundles apart; of one that is a folder, of the list of what is in it."""
-    return _digest(bundle / MANIFEST if bundle.is_dir() else bundle)
+    return _digest(bundle / MANIFEST if os.path.isdir(bundle) else bundle)
 
 
 def _digest(file: Path) -> str:

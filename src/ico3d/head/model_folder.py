@@ -1,6 +1,7 @@
 """A trained head with everything needed to drive it, as a model folder stores it."""
 
 import json
+import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -95,7 +96,7 @@ class TrainedHead:
                 capture is the training's recording but its head poses have changed.
         """
         trained_on = self.summary.get("recording", {})
-        same = trained_on.get("path") == str(capture.path.resolve())
+        same = trained_on.get("path") == os.path.realpath(capture.path)
         if same and trained_on.get("poses") != poses_digest(capture):
             raise ModelError(
                 f"the head poses of {capture.path} have changed since this head was trained with "

@@ -1,5 +1,6 @@
 """Trains a head on a capture and writes the model folder."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -70,7 +71,7 @@ class HeadJob:
 
     def about(self, capture: Path) -> dict:
         """Values that a run must share with an interrupted one to continue it."""
-        about = {"capture": str(capture.resolve()), **asdict(self)}
+        about = {"capture": os.path.realpath(capture), **asdict(self)}
         for name in ("hold_out", "over_torso"):
             if not about[name]:
                 del about[name]  # runs of earlier versions say nothing of it

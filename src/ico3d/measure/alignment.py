@@ -1,5 +1,6 @@
 """Forced alignment by pocketsphinx: the time of each speech sound in a recording."""
 
+import os
 import re
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def transcripts(folder: Path) -> dict[Path, str]:
     if head is None:
         raise SettingsError(f"{folder / 'README.md'} has no table with a column 'words'.")
     column = head.index("words")
-    rows = [row for row in rows if len(row) > column and (folder / row[0]).is_file()]
+    rows = [row for row in rows if len(row) > column and os.path.isfile(folder / row[0])]
     if not rows:
         raise SettingsError(f"{folder} has none of the files that its README.md lists.")
     return {folder / row[0]: row[column] for row in rows}

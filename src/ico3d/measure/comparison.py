@@ -1,5 +1,6 @@
 """Scores rendered pictures against recorded ones, whoever rendered them."""
 
+import os
 from collections.abc import Iterable, Iterator
 from itertools import zip_longest
 from pathlib import Path
@@ -37,7 +38,7 @@ def pictures_of(path: Path, fps: float) -> Iterator[np.ndarray]:
     Raises:
         CaptureError: If there is no picture, or one cannot be read.
     """
-    if not path.is_dir():
+    if not os.path.isdir(path):
         for picture in open_video(path, WIDEST).frames(fps):
             yield picture.astype(np.float32) / 255
         return

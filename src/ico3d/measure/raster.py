@@ -2,6 +2,7 @@
 
 import ctypes
 import importlib.util
+import os
 import subprocess
 import time
 from collections.abc import Callable
@@ -127,7 +128,7 @@ def load_opponent(path: Path) -> ModuleType:
         SettingsError: If the file is missing or does not define both.
     """
     spec = importlib.util.spec_from_file_location("raster_opponent", path)
-    if not path.is_file() or spec is None or spec.loader is None:
+    if not os.path.isfile(path) or spec is None or spec.loader is None:
         raise SettingsError(f"--against names no Python file: {path}.")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

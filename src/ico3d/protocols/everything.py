@@ -1,5 +1,6 @@
 """All protocols in one run, on given recordings or on synthetic ones in the data sets' layouts."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -278,9 +279,9 @@ def _synthetic(
     """A recording in a data set's layout, made now unless it is there."""
     folder = terms.out / "recordings"
     studio, written = folder / f"studio-{name}", folder / name
-    if written.is_dir():
+    if os.path.isdir(written):
         return written
-    if not (studio / "capture.json").is_file():
+    if not os.path.isfile(studio / "capture.json"):
         record(recording, studio, 2)
     _whole(written, lambda to: write(open_capture(studio), to))
     return written
@@ -289,7 +290,7 @@ def _synthetic(
 def _whole(folder: Path, write: Callable[[Path], Path]) -> None:
     """Writes a folder that is there only once it is whole."""
     unfinished = folder.with_name(folder.name + ".unfinished")
-    if unfinished.is_symlink():
+    if os.path.islink(unfinished):
         unfinished.unlink()
     rmtree(unfinished, ignore_errors=True)
     write(unfinished)

@@ -1,5 +1,6 @@
 """The protocol of talking portraits: self-driven and cross-driven heads (paper, section 4.2)."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -156,7 +157,7 @@ def _recorded(
     return Recorded(
         pictures / "gt" / camera,
         capture.fps,
-        masks if masks.is_dir() else None,
+        masks if os.path.isdir(masks) else None,
         heard,
         face_box(marks),
     )

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import time
 from collections import defaultdict
 from collections.abc import AsyncIterator
@@ -284,7 +285,7 @@ def _add_making(app: FastAPI, room: Room) -> None:
     @app.get(making + "/face")
     async def face(name: str) -> Response:
         file = Places(room.people.person(name).folder).folder / FACE
-        if not file.is_file() or file.is_symlink():
+        if not os.path.isfile(file) or os.path.islink(file):
             raise Refused("part", "there is no picture yet.", 404)
         return FileResponse(file, media_type="image/jpeg", headers=NEVER_KEPT)
 
@@ -316,7 +317,7 @@ def _status(room: Room, person: Person) -> dict[str, Any]:
         "making": _of_making(room, person),
         "durations": dict(room.durations.of(person)),
         "body": as_form(room.bodies.choice(person)),
-        "avatar": Places(person.folder).avatar.is_file(),
+        "avatar": os.path.isfile(Places(person.folder).avatar),
     }
 
 

@@ -105,7 +105,7 @@ class Studio:
             print(f"Without guidance by the face: {room.eye.lacking}", file=sys.stderr)
         if self.voice and (lacking := hindrance()):
             print(f"Avatars are made without a voice of their own: {lacking}", file=sys.stderr)
-        if not (server.STATIC / "studio.html").is_file():
+        if not os.path.isfile(server.STATIC / "studio.html"):
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()
         if self.browser:

@@ -1,6 +1,7 @@
 """Body tracks: a recorded person's rig, its pose in every frame, and a mesh bound to it."""
 
 import json
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -129,7 +130,7 @@ class BodyTrack:
 
 def track_file(recording: Path) -> Path:
     """File of a recording's body track: in its folder, or beside a recording that is a file."""
-    return recording / NAME if recording.is_dir() else recording.with_suffix(f".{NAME}")
+    return recording / NAME if os.path.isdir(recording) else recording.with_suffix(f".{NAME}")
 
 
 def write_body_track(track: BodyTrack, recording: Path) -> Path:
@@ -165,7 +166,7 @@ def read_body_track(recording: Path, num_frames: int, fps: float) -> BodyTrack |
         CaptureError: If the file is damaged or belongs to another recording.
     """
     file = track_file(recording)
-    if not file.is_file():
+    if not os.path.isfile(file):
         return None
     try:
         track = _read(file)

@@ -1,5 +1,6 @@
 """Trains a static scene on a capture and writes the model folder."""
 
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -60,7 +61,7 @@ def train_scene(
             not work.
         ModelError: If training diverges.
     """
-    run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
+    run = RunFolder(folder, {"capture": os.path.realpath(capture.path), **asdict(job)})
     if run.finished() is not None:
         return TrainedScene.load(folder)
     settings = job.settings

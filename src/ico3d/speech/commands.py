@@ -1,6 +1,7 @@
 """The verbs `ico3d train speech` and `ico3d weights onnx`."""
 
 import json
+import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TextIO
@@ -66,7 +67,7 @@ class TrainSpeech:
     def _metrics(self, step: int) -> TextIO:
         """metrics.jsonl, without what an interrupted run wrote after its last checkpoint."""
         path = self.out / "metrics.jsonl"
-        lines = read_small(path).splitlines(keepends=True) if path.exists() else []
+        lines = read_small(path).splitlines(keepends=True) if os.path.exists(path) else []
         write_atomic(path, b"".join(lines[:step]))  # a link there is replaced, not followed
         return path.open("a")
 

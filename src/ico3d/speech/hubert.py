@@ -1,6 +1,7 @@
 """HuBERT (Hsu et al. 2021) as a speech encoder, through transformers (torch)."""
 
 import io
+import os
 import warnings
 from pathlib import Path
 from typing import Any
@@ -78,7 +79,7 @@ def weight_file(folder: Path) -> Path:
     Raises:
         ModelError: If the folder has no such file.
     """
-    found = next((folder / name for name in WEIGHTS if (folder / name).is_file()), None)
+    found = next((folder / name for name in WEIGHTS if os.path.isfile(folder / name)), None)
     if found is None:
         raise ModelError(f"{folder} holds no weights: neither {WEIGHTS[0]} nor {WEIGHTS[1]}.")
     return found

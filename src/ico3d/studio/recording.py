@@ -5,6 +5,7 @@ The layout is described in `docs/captures/synthetic.md`, "Synthetic captures".
 
 import io
 import json
+import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -210,7 +211,7 @@ def _begin(recording: Recording, out: Path) -> None:
     mark = out / UNFINISHED
     if holds(mark, settings):
         return
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if os.path.exists(out) and (not os.path.isdir(out) or any(out.iterdir())):
         raise SettingsError(f"{out} holds something already: name a new folder.")
     write_atomic(mark, settings)
 
@@ -244,7 +245,7 @@ def _draw(
         frame: [
             int(c)
             for c in np.flatnonzero(row)
-            if not (out / "masks" / cameras[c].name / _png_name(frame)).exists()
+            if not os.path.exists(out / "masks" / cameras[c].name / _png_name(frame))
         ]
         for frame, row in enumerate(views)
     }

@@ -272,7 +272,7 @@ def check_tensor(name: str, tensor: Tensor, size: Size, below: int | None = None
 @contextmanager
 def _opened(path: Path, advice: str = ": train again") -> Iterator[safe_open]:
     try:
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise ModelError(f"there is no model file at {path}.")
         check_head(path)
         with safe_open(path, framework="pt") as file:

@@ -1,5 +1,6 @@
 """Says before a training how much time, memory and disk it takes, by doing a few of its steps."""
 
+import os
 import resource
 import shutil
 import statistics
@@ -174,4 +175,5 @@ def _duration(seconds: float) -> str:
 
 def _existing(folder: Path) -> Path:
     """A folder, or the nearest one above it that is there."""
-    return next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    places = (folder.absolute(), *folder.absolute().parents)
+    return next(path for path in places if os.path.exists(path))

@@ -77,7 +77,8 @@ def _copy_before(path: Path, size: int, step: int, target: Path) -> None:
 
 def _size(path: Path) -> int:
     """Bytes at the end of a metrics file that are kept; of what a link leads to, none."""
-    return 0 if path.is_symlink() or not path.is_file() else min(path.stat().st_size, MOST_NOTES)
+    is_ours = os.path.isfile(path) and not os.path.islink(path)
+    return min(path.stat().st_size, MOST_NOTES) if is_ours else 0
 
 
 def _is_before(line: bytes, step: int) -> bool:
@@ -89,7 +90,7 @@ def _is_before(line: bytes, step: int) -> bool:
 
 def latest_entry(folder: Path) -> dict | None:
     """The last entry of a run's metrics.jsonl, or None; a training may be writing to the file."""
-    if not (folder / METRICS).is_file():
+    if not os.path.isfile(folder / METRICS):
         return None
     try:
         with (folder / METRICS).open("rb") as file:

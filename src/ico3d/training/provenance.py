@@ -1,6 +1,7 @@
 """What made a model: version, machine, seed and the parts of the settings that took effect."""
 
 import json
+import os
 import subprocess
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -44,7 +45,7 @@ def environments(folders: Iterable[Path]) -> list[dict]:
     """The environments of some runs, each once, in the order of the folders."""
     found: dict[str, dict] = {}
     for file in (folder / ENVIRONMENTS for folder in folders):
-        if file.is_file():
+        if os.path.isfile(file):
             found |= {json.dumps(one, sort_keys=True): one for one in _listed(file)}
     return list(found.values())
 
@@ -74,7 +75,7 @@ def provenance(folders: Iterable[Path], seed: int, used: Mapping[str, object]) -
 def _commit() -> str | None:
     """The commit of the checkout that ico3d runs from, with `-dirty` where files were changed."""
     root = Path(ico3d.__file__).parents[2]
-    if not (root / ".git").exists():
+    if not os.path.exists(root / ".git"):
         return None
     command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40"]
     command += ["--exclude", "*"]  # tags would hide the commit

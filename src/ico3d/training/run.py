@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,9 @@ def goes_on(path: Path, settings: Mapping) -> bool:
         ModelError: If the folder's settings are damaged.
     """
     file = path / SETTINGS
-    return not file.exists() or not _differences(_read(file), json.loads(json.dumps(settings)))
+    if not os.path.exists(file):
+        return True
+    return not _differences(_read(file), json.loads(json.dumps(settings)))
 
 
 def _differences(earlier: Mapping, now: Mapping) -> dict[str, tuple[Any, Any]]:
@@ -73,7 +76,7 @@ class RunFolder:
         self._usable = True  # whether the newest checkpoint is
         self.path.mkdir(parents=True, exist_ok=True)
         file = path / SETTINGS
-        if file.exists():
+        if os.path.exists(file):
             self._check_same(_read(file))
         else:
             write_atomic(file, json.dumps(self.settings, indent=1).encode())
@@ -88,9 +91,9 @@ class RunFolder:
     def _check_files(self) -> None:
         """Raises ModelError if a folder lies in the place of a file, or a file in that of one."""
         for one in self.path.iterdir():
-            if one.is_dir() and one.suffix in (".json", ".jsonl", ".safetensors"):
+            if os.path.isdir(one) and one.suffix in (".json", ".jsonl", ".safetensors"):
                 raise ModelError(f"{one} is a folder in the place of a file: move it away.")
-        if (board := self.path / BOARD).exists() and not board.is_dir():
+        if os.path.exists(board := self.path / BOARD) and not os.path.isdir(board):
             raise ModelError(f"{board} is a file in the place of a folder: move it away.")
 
     def _check_same(self, earlier: dict) -> None:
@@ -117,7 +120,7 @@ class RunFolder:
         """
         faults: list[ModelError] = []
         for file in (self.path / name for name in CHECKPOINTS):
-            if not file.exists():
+            if not os.path.exists(file):
                 continue
             try:
                 found = _checked(file, names)
@@ -164,7 +167,7 @@ class RunFolder:
             ModelError: If it is damaged.
         """
         file = self.path / FINISHED
-        return _read(file) if file.exists() else None
+        return _read(file) if os.path.exists(file) else None
 
     def _drop_checkpoints(self) -> None:
         for name in CHECKPOINTS:

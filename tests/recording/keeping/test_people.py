@@ -12,6 +12,8 @@ from ico3d.errors import SettingsError, StorageError
 from ico3d.recording.keeping import people as room
 from ico3d.recording.keeping.people import People
 from ico3d.recording.refusals import Refused
+from support.strangers.links import ODD_LINKS
+from support.strangers.nested import nested
 from support.studio_page.parts import DAY, begun, kept
 
 WEBM = b"\x1a\x45\xdf\xa3" + bytes(60)
@@ -192,6 +194,43 @@ def test_whose_files_lie_behind_a_link_is_nobody_and_is_not_named(tmp_path, plac
     assert People(tmp_path).names() == [ada.name]
     with pytest.raises(Refused, match="nothing is recorded of Ida"):
         People(tmp_path).person("Ida")
+
+
+@pytest.mark.parametrize("leads_to", ODD_LINKS)
+def test_a_link_that_cannot_be_followed_hides_nobody_else(tmp_path, leads_to):
+    ada = begun(tmp_path, "Ada")
+    (tmp_path / "Bob").mkdir()
+    for link in (tmp_path / "Bob" / "consent.json", tmp_path / "Eve"):
+        link.symlink_to(link.name if leads_to is None else leads_to)
+    people = People(tmp_path)
+    assert people.names() == ["Ada"]
+    for name in ("Bob", "Eve"):
+        with pytest.raises(Refused, match="nothing is recorded"):
+            people.person(name)
+    (ada.folder / "loop").symlink_to("loop" if leads_to is None else leads_to)
+    left = tmp_path / ".Ida.0123456789abcdef.gone"
+    left.mkdir()
+    (left / "loop").symlink_to("loop" if leads_to is None else leads_to)
+    people.clear()
+    people.delete("Ada")
+    assert {path.name for path in tmp_path.iterdir()} == {"Bob", "Eve"}
+
+
+def test_who_is_nested_deep_is_deleted(tmp_path):
+    ida = begun(tmp_path)
+    kept(ida, "consent", WEBM)
+    with nested(ida.folder / "parts"):
+        People(tmp_path).delete("Ida")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_was_spelled_elsewhere_is_found(tmp_path):
+    begun(tmp_path, "Zoë").folder.rename(tmp_path / "Zoe\u0308")
+    people = People(tmp_path)
+    (name,) = people.names()
+    assert people.person(name).consent()["language"] == "en"
+    people.delete(name)
+    assert people.names() == []
 
 
 def test_of_a_folder_of_thousands_some_are_looked_at(tmp_path, monkeypatch):

@@ -293,6 +293,40 @@ def test_what_has_changed_since_a_making_began_is_known(people, makers):
     assert makers.changed(ada, makers.progress(ada)) == []
 
 
+def test_nobody_waits_for_the_removal_of_what_another_one_made(people, makers, monkeypatch):
+    ada, ida = people.person("Ada"), people.person("Ida")
+    held, removed = threading.Event(), []
+
+    def slow(paths):
+        assert not paths or held.wait(20)
+        removed.extend(paths)
+
+    monkeypatch.setattr(room, "remove", slow)
+    acts = [
+        lambda: makers.discard(ada),
+        lambda: makers.begin(ada, "good", anew=True),
+        lambda: makers.withdraw(ada, "text-1"),
+    ]
+    for act in acts:
+        work = Places(ada.folder).work
+        makers.begin(ada, "good")
+        makers.stop(ada)
+        work.mkdir(exist_ok=True)
+        (work / "made").touch()
+        one = threading.Thread(target=act)
+        one.start()
+        while (work / "made").exists():
+            time.sleep(0.01)
+        assert makers.progress(ida) is None  # at once
+        held.set()
+        one.join()
+        held.clear()
+        (gone,) = removed
+        assert gone.parent == people.folder and gone.name.endswith(".gone")
+        removed.clear()
+        makers.stop(ada)
+
+
 def test_a_making_is_begun_anew_or_discarded_and_a_finished_avatar_stays(people, makers):
     ada = people.person("Ada")
     places = Places(ada.folder)

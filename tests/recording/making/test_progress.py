@@ -100,6 +100,7 @@ def test_what_is_damaged_is_nothing(tmp_path):
     assert read_progress(tmp_path) is None
     whole = '{"state": "made", "quality": "good", "%s": %s}'
     odd = [whole % ("made_of", "3"), whole % ("decibels", "Infinity"), "[" * 100_000]
+    odd += [whole % ("decibels", "1e999"), whole % ("step", '"fly"')]
     odd += [whole % ("advice", "[" + "[]," * 30_000 + "[]]")]
     odd += [f'{{"state": {state}, "quality": {quality}}}' for state, quality in ODD_PAIRS]
     odd += [

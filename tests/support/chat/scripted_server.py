@@ -38,11 +38,13 @@ class Script:
         abandoned: Streams whose reader hung up.
         models: Names that it offers.
         keys: Authorization headers.
+        refusal: What it says beside a status that is no answer.
     """
 
     def __init__(self, answer=lambda body: ["All right."], models=("tiny",)):
         self.answer, self.models = answer, models
         self.requests, self.keys, self.abandoned = [], [], 0
+        self.refusal = "tools are not supported"
 
     def app(self):
         app = FastAPI()
@@ -58,7 +60,7 @@ class Script:
             self.keys.append(request.headers.get("authorization"))
             parts = self.answer(body)
             if isinstance(parts, int):
-                return JSONResponse({"error": {"message": "tools are not supported"}}, parts)
+                return JSONResponse({"error": {"message": self.refusal}}, parts)
             if not body.get("stream"):
                 return whole("".join(part for part in parts if isinstance(part, str)))
             return StreamingResponse(self.stream(parts), media_type="text/event-stream")

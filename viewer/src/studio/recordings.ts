@@ -1,5 +1,6 @@
 import { PageError } from '../errors.ts';
 import type { Server } from '../server.ts';
+import { parseCalmly } from '../words/calm.ts';
 import { isKey, say, type Key, type Message } from '../words/text.ts';
 import { adviceOf, together, type Advice } from './advice.ts';
 
@@ -164,9 +165,18 @@ export class Recordings {
     const response = await fetch(this.server.recordings(path, values), { method, body, cache: 'no-store' }).catch(() => null);
     if (response === null) throw new Refusal(0, '', '');
     if (response.status === 204) return undefined as Answer;
-    const answer = (await response.json().catch(() => ({}))) as Answer & { code?: string; error?: string; advice?: Advice[] };
+    const answer = (await told(response)) as Answer & { code?: string; error?: string; advice?: Advice[] };
     if (response.ok) return answer;
     throw new Refusal(response.status, answer.code ?? '', answer.error ?? `${response.status} ${response.statusText}`, answer.advice);
+  }
+}
+
+/** What an answer says, of which much may stand in a folder that somebody brought; nothing where it is no JSON. */
+async function told(response: Response): Promise<unknown> {
+  try {
+    return parseCalmly(await response.text());
+  } catch {
+    return {};
   }
 }
 

@@ -6,6 +6,7 @@ its motion can turn around or be held where they slow down away from rest.
 """
 
 import math
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,7 +122,7 @@ def read_animation(folder: Path, body: MovingBody) -> Animation | None:
         BundleError: If the file makes no sense, or belongs to another body.
     """
     file, frames = folder / ANIMATION, body.windows[-1].last + 1
-    if not file.is_file():
+    if not os.path.isfile(file):
         return None
     try:
         animation = Animation.from_bytes(read_small(file))

@@ -82,7 +82,7 @@ def _walk(project: Path) -> Iterator[Holding]:
         folders[:] = sorted(n for n in folders if not n.startswith(".") or is_unfinished(n))
         if folder != project and (found := _folder(folder)) is not None:
             yield found
-        for link in (folder / name for name in folders if (folder / name).is_symlink()):
+        for link in (folder / name for name in folders if os.path.islink(folder / name)):
             place = os.path.realpath(link)
             if place not in led_to:
                 led_to[place] = _folder(link)
@@ -95,12 +95,12 @@ def _walk(project: Path) -> Iterator[Holding]:
 
 def _folder(folder: Path) -> Holding | None:
     """What a folder is; None where it is none of ours."""
-    about = next((file for mark, file in RECORDINGS.items() if (folder / mark).is_file()), None)
+    about = next((file for mark, file in RECORDINGS.items() if os.path.isfile(folder / mark)), None)
     if about is not None:
         return _recording(folder, about)
-    if (folder / MANIFEST).is_file():
+    if os.path.isfile(folder / MANIFEST):
         return _bundle(folder)
-    if (folder / ABOUT).is_file() and (found := _workplace(folder)) is not None:
+    if os.path.isfile(folder / ABOUT) and (found := _workplace(folder)) is not None:
         return found
     is_run, made_of = _training(folder)
     models = [_shown(folder / name) for name in MODELS]
@@ -159,7 +159,7 @@ def _file(file: Path) -> Holding | None:
     if file.suffix.casefold() == BUNDLE:
         return _bundle(file)
     try:
-        if not file.is_file():
+        if not os.path.isfile(file):
             return None
         with file.open("rb", buffering=0) as opened:
             if opened.read(len(ZIP)) != ZIP:
@@ -173,7 +173,7 @@ def _file(file: Path) -> Holding | None:
 def _bundle(path: Path) -> Holding:
     try:
         about = Manifest.from_json(open_archive(path).read(MANIFEST)).provenance
-    except (Ico3dError, KeyError):  # damaged, but here
+    except (OSError, Ico3dError, KeyError):  # damaged, but here
         return Holding(path, "a bundle", ())
     return Holding(path, "a bundle", (NOBODY,) if about.is_synthetic else _named(about.likeness))
 

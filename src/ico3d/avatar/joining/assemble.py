@@ -1,5 +1,6 @@
 """Makes an avatar from a trained head and a capture of the whole person."""
 
+import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -34,6 +35,7 @@ from ico3d.capture.parts.held_out import training_part
 from ico3d.capture.parts.trained_on import is_same_recording, trained_on
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
+from ico3d.common.files import resolved
 from ico3d.errors import CaptureError, ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.device import computing_device
@@ -73,9 +75,9 @@ class Assembly:
 
     def about(self, capture: Path) -> dict:
         """Settings that a run must share with an interrupted one to continue it."""
-        paths = {"head": str(self.head.resolve()), "capture": str(capture.resolve())}
+        paths = {"head": os.path.realpath(self.head), "capture": os.path.realpath(capture)}
         if self.continued:
-            paths["continued"] = str(self.continued.resolve())
+            paths["continued"] = os.path.realpath(self.continued)
         held = {"hold_out": True} if self.hold_out else {}
         return (
             paths
@@ -108,7 +110,7 @@ def prepare(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> Run
         SettingsError: If the folder holds a run with other settings.
     """
     run = RunFolder(folder, assembly.about(capture.path))
-    if not (folder / SEAM).is_file():  # written last of the head's files
+    if not os.path.isfile(folder / SEAM):  # written last of the head's files
         place_head(capture, folder, assembly, say)
     return run
 
@@ -134,8 +136,8 @@ def assemble(
     run = prepare(capture, folder, assembly, say)
     if run.finished() is not None:
         return TrainedAvatar.load(folder)
-    source = HeadSource(folder.resolve(), assembly.joining.border_points, assembly.joining.pruning)
-    continued = assembly.continued and assembly.continued.resolve()
+    source = HeadSource(resolved(folder), assembly.joining.border_points, assembly.joining.pruning)
+    continued = assembly.continued and resolved(assembly.continued)
     given = (assembly.method, assembly.seed, assembly.body, source, continued, assembly.device)
     job = BodyJob(*given, assembly.hold_out)
     body = train_body(capture, folder / BODY, job, runner)

@@ -5,6 +5,7 @@ import hashlib
 import json
 import logging
 import math
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -154,14 +155,14 @@ def copy_cache(source: Path, target: Path) -> None:
     Raises:
         ModelError: If the target is a link.
     """
-    if target.is_symlink():
+    if os.path.islink(target):
         raise ModelError(f"{target} is a link: what is measured would be written elsewhere.")
-    if source.is_symlink():
+    if os.path.islink(source):
         return
     cached = [file for file in source.glob("*.npz") if CACHED.fullmatch(file.name)]
     newest = sorted(cached, key=lambda file: file.lstat().st_mtime_ns)[-MOST_CAMERAS:]
     for file in newest:
-        if not (target / file.name).exists():
+        if not os.path.exists(target / file.name):
             with contextlib.suppress(OSError):  # no file of ours: it is measured again
                 write_atomic(target / file.name, read_small(file, links=False, most=MOST_CACHED))
 
@@ -273,7 +274,7 @@ class _Work:
         digest = hashlib.sha256()
         about = [VERSION, self.method.name, HEIGHT, MOVING, self.pixel, camera.width, camera.height]
         span = [self.index, self.span.first, self.span.last]
-        digest.update(json.dumps([*about, *span, str(self.capture.path.resolve())]).encode())
+        digest.update(json.dumps([*about, *span, os.path.realpath(self.capture.path)]).encode())
         digest.update(camera.intrinsics.tobytes() + camera.world_to_camera.tobytes())
         for frame in sorted(frames):
             for part in self.picture(frame) or ():

@@ -1,6 +1,7 @@
 """Optical flow between two pictures: RAFT where it is installed, else OpenCV's DIS."""
 
 import itertools
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -139,7 +140,7 @@ def _raft() -> tuple[str, Path] | None:
     folders = (*model_folders(), Path(torch.hub.get_dir()) / "checkpoints")
     choices = itertools.product(RAFT_CHECKPOINTS.items(), folders)
     files = ((builder, folder / name) for (builder, name), folder in choices)
-    return next(((builder, file) for builder, file in files if file.is_file()), None)
+    return next(((builder, file) for builder, file in files if os.path.isfile(file)), None)
 
 
 def opencv() -> Any:

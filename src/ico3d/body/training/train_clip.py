@@ -1,5 +1,6 @@
 """Trains a body from a capture: plans windows, trains them, fine-tunes, saves a model folder."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -62,9 +63,9 @@ class BodyJob:
 
     def about(self, capture: Path) -> dict:
         """Values, beside the settings, that a run must share with an interrupted one."""
-        about = {"capture": str(capture.resolve()), "method": self.method, "seed": self.seed}
+        about = {"capture": os.path.realpath(capture), "method": self.method, "seed": self.seed}
         if self.continued is not None:
-            about["continued"] = str(self.continued.resolve())
+            about["continued"] = os.path.realpath(self.continued)
         if self.hold_out:
             about["hold_out"] = True
         return about | ({"companion": self.companion.about()} if self.companion else {})
@@ -337,7 +338,7 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
     plan = make_plan(capture, job.settings.windows, folder, computing_device(job.device))
     print_plan(plan, Console())
     told, picture = folder / "plan.json", folder / "plan.png"
-    if not (picture.is_file() and is_saved(plan, told)):  # a continued run has both already
+    if not (os.path.isfile(picture) and is_saved(plan, told)):  # a continued run has both already
         draw_plan(plan, capture, picture)
         save_plan(plan, told)
     return plan

@@ -16,6 +16,7 @@ import psutil
 
 from ico3d.body.training.train_clip import WindowTask
 from ico3d.body.workers.jobs import Lost, work
+from ico3d.common.files import resolved
 from ico3d.errors import Ico3dError, MissingExtraError, SettingsError
 
 ANSWER = 10.0
@@ -70,7 +71,7 @@ class RayCluster:
 
     def start(self, task: WindowTask) -> None:
         """Submits a window to Ray."""
-        places = {name: getattr(task, name).resolve() for name in ("capture", "folder", "flow")}
+        places = {name: resolved(getattr(task, name)) for name in ("capture", "folder", "flow")}
         # No retries by Ray: they would be neither counted per checkpoint nor shown.
         remote = self._ray.remote(max_retries=0, **self._needs)(work)
         self._running[remote.remote(replace(task, **places), self._needs["num_cpus"])] = task

@@ -1,5 +1,6 @@
 """Finds the files of a DNA-Rendering recording."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +28,7 @@ class Files:
 
 def is_recording(path: Path) -> bool:
     """Whether a path is a main SMC file or a folder that holds one."""
-    return path.suffix == ".smc" if path.is_file() else bool(_mains(path))
+    return path.suffix == ".smc" if os.path.isfile(path) else bool(_mains(path))
 
 
 def find_files(path: Path) -> Files:
@@ -59,7 +60,7 @@ def _mains(folder: Path) -> list[Path]:
 
 def _only_main(path: Path) -> Path:
     """The main file that is meant."""
-    if path.is_file():
+    if os.path.isfile(path):
         if path.stem.endswith((ANNOTATIONS, KINECT)):
             raise CaptureError(f"{path} has no pictures: name the main file instead.")
         return path
@@ -71,4 +72,4 @@ def _companion(main: Path, kind: str, suffix: str) -> Path | None:
     name = f"{main.stem}{suffix}.smc"
     folder = main.absolute().parent
     places = [folder, folder.with_name(folder.name.replace("main", kind))]
-    return next((place / name for place in places if (place / name).is_file()), None)
+    return next((place / name for place in places if os.path.isfile(place / name)), None)

@@ -99,7 +99,7 @@ def _unwritable(recording: Path, why: str | None) -> CaptureError:
 
 def track_file(recording: Path) -> Path:
     """Path of a recording's track: in the recording's folder, or beside the recording's file."""
-    return recording / NAME if recording.is_dir() else recording.with_suffix(f".{NAME}")
+    return recording / NAME if os.path.isdir(recording) else recording.with_suffix(f".{NAME}")
 
 
 def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack | None:
@@ -117,7 +117,7 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
         CaptureError: If the file is damaged or belongs to another recording.
     """
     file = track_file(recording)
-    if not file.is_file():
+    if not os.path.isfile(file):
         return None
     mend = "delete it and run ico3d capture track again"
     shapes = {

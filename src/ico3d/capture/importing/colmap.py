@@ -1,5 +1,6 @@
 """Reads COLMAP's sparse models, text and binary (COLMAP's documentation, "Output Format")."""
 
+import os
 import struct
 from array import array
 from collections.abc import Iterator
@@ -37,7 +38,7 @@ Pose = tuple[str, int, np.ndarray]
 def is_model(folder: Path) -> bool:
     """Whether a folder holds a sparse model."""
     return any(
-        (folder / f"cameras.{kind}").is_file() and (folder / f"images.{kind}").is_file()
+        os.path.isfile(folder / f"cameras.{kind}") and os.path.isfile(folder / f"images.{kind}")
         for kind in ("bin", "txt")
     )
 
@@ -52,7 +53,7 @@ def read_colmap(model: Path, images: Path) -> Foreign:
     Raises:
         CaptureError: If a file is missing or damaged, or a camera model is not supported.
     """
-    binary = (model / "cameras.bin").is_file()
+    binary = os.path.isfile(model / "cameras.bin")
     suffix = "bin" if binary else "txt"
     cameras, poses, points = (model / f"{n}.{suffix}" for n in ("cameras", "images", "points3D"))
     try:
@@ -63,7 +64,7 @@ def read_colmap(model: Path, images: Path) -> Foreign:
             for pose in (_binary_poses(poses) if binary else _text_poses(poses))
         ]
         cloud = None
-        if points.is_file():
+        if os.path.isfile(points):
             cloud = _binary_points(points) if binary else _text_points(points)
     except (ValueError, IndexError, OverflowError, struct.error, OSError) as error:
         raise CaptureError(f"{model}: the COLMAP model is damaged or cut off.") from error

@@ -1,5 +1,6 @@
 """Recordings of other programs in a common form, before they become a multiview folder."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 from ico3d.capture.decoding import size_of
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.files import PICTURES
-from ico3d.common.files import LONGEST
+from ico3d.common.files import LONGEST, resolved
 from ico3d.errors import CaptureError
 
 SAME_SHAPE = 0.01
@@ -62,12 +63,12 @@ def inside(folder: Path, name: str, what: str) -> Path:
     Raises:
         CaptureError: If the file lies elsewhere, is missing, or has an unknown format.
     """
-    root = folder.resolve()
+    root = resolved(folder)
     if len(name) > LONGEST:  # to resolve it would take the square of its parts
         raise CaptureError(f"{what}: no picture has a name of {len(name)} letters.")
     try:
-        path = (root / name).resolve()
-        found = next(p for p in (path, *_suffixed(path)) if p.is_file())
+        path = resolved(root / name)
+        found = next(p for p in (path, *_suffixed(path)) if os.path.isfile(p))
     except (StopIteration, OSError, ValueError, RuntimeError) as error:
         raise CaptureError(f"{what}: the picture {name!r} is missing in {folder}.") from error
     if not found.is_relative_to(root):

@@ -20,6 +20,7 @@ from ico3d.capture.multiview.writing import shown
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.capture.vetting.claims import MOST_GAPS
 from ico3d.capture.writing.new_folder import check_room, new_folder
+from ico3d.common.files import resolved
 from ico3d.errors import CaptureError
 
 NEARLY = np.cos(np.radians(20))
@@ -50,7 +51,7 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
         for name, shots in zip(_names(cameras), cameras, strict=True)
     )
     count = max(max(row) for row in frames) + 1
-    sources = (f"{foreign.tool}: {source.resolve().name}",)
+    sources = (f"{foreign.tool}: {resolved(source).name}",)
     told = (settings.consent, settings.licence, settings.shows, settings.likeness)
     about = Description(settings.fps, count, places, sources, *told)
     with new_folder(out, settings.likeness, sources) as work:
@@ -67,10 +68,10 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
 
 def _read(source: Path, images: Path | None) -> Foreign:
     """Finds out what the source is."""
-    if not source.exists():
+    if not os.path.exists(source):
         raise CaptureError(f"there is nothing at {source}.")
-    transforms = source / "transforms.json" if source.is_dir() else source
-    if transforms.suffix == ".json" and transforms.is_file():
+    transforms = source / "transforms.json" if os.path.isdir(source) else source
+    if transforms.suffix == ".json" and os.path.isfile(transforms):
         return read_transforms(transforms)
     below = (".", "sparse/0", "sparse", "colmap/sparse/0", "distorted/sparse/0")
     model = next((source / name for name in below if is_model(source / name)), None)
@@ -84,9 +85,9 @@ def _read(source: Path, images: Path | None) -> Foreign:
 
 def _images_near(source: Path, model: Path) -> Path:
     """The folder of pictures that belongs to a COLMAP model."""
-    above = model.resolve().parents
+    above = resolved(model).parents
     places = [folder / "images" for folder in (source, *above[:3])]
-    found = next((folder for folder in places if folder.is_dir()), None)
+    found = next((folder for folder in places if os.path.isdir(folder)), None)
     if found is None:
         raise CaptureError(
             f"{source} has no folder 'images': name that of the pictures (--images)."

@@ -127,10 +127,10 @@ class RecordedFiles:
 
     def _find_clip(self, name: str) -> Clip | None:
         """The video of a camera unless it has pictures."""
-        if (self.folder / "images" / name).is_dir():
+        if os.path.isdir(self.folder / "images" / name):
             return None
         videos = (self.folder / "videos" / f"{name}{suffix}" for suffix in VIDEOS)
-        video = next((path for path in videos if path.is_file()), None)
+        video = next((path for path in videos if os.path.isfile(path)), None)
         if video is None:
             raise CaptureError(
                 f"{self.folder}: camera {name} has neither videos/{name}.mp4 nor images/{name}."
@@ -164,4 +164,4 @@ class RecordedFiles:
 def _existing(folder: Path, stem: str) -> Path | None:
     """The picture file of a name."""
     paths = (folder / f"{stem}{suffix}" for suffix in PICTURES)
-    return next((path for path in paths if path.is_file()), None)
+    return next((path for path in paths if os.path.isfile(path)), None)

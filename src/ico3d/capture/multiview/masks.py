@@ -10,7 +10,7 @@ from PIL import Image
 from ico3d.capture.multiview.cutout import matte
 from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.multiview.reader import MultiviewCapture
-from ico3d.common.files import write_one_of_many
+from ico3d.common.files import resolved, write_one_of_many
 from ico3d.errors import CaptureError
 
 log = logging.getLogger(__name__)
@@ -33,7 +33,7 @@ def make_masks(folder: Path, workers: int) -> int:
     capture = MultiviewCapture(folder)
     for lens in capture.lenses:
         place = folder / "masks" / lens.name
-        if not place.resolve().is_relative_to(folder.resolve()):
+        if not resolved(place).is_relative_to(resolved(folder)):
             raise CaptureError(f"{place} leads out of the recording: put a folder there instead.")
     plates = [capture.files.plate(camera) is not None for camera in range(len(capture.cameras))]
     if not any(plates):

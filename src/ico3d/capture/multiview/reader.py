@@ -1,6 +1,7 @@
 """Reads a multiview folder (docs/captures/multiview.md)."""
 
 import copy
+import os
 from pathlib import Path
 
 import numpy as np
@@ -153,7 +154,7 @@ class MultiviewCapture(RecordedCapture):
     def _points(self, frame: int) -> np.ndarray | None:
         """(P, 3) the file's points, in the space that the folder's kind decides."""
         file = self.path / "points" / f"{self._index(frame):06d}.npy"
-        if not file.is_file():
+        if not os.path.isfile(file):
             return None
         points = read_numbers(file)
         if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
@@ -176,9 +177,9 @@ class MultiviewCapture(RecordedCapture):
     def inspect(self) -> list[Finding]:
         """Missing or damaged pictures and masks, and videos that are too short."""
         findings = [self._inspect_pictures()]
-        if (self.path / "masks").is_dir():
+        if os.path.isdir(self.path / "masks"):
             findings.append(self._inspect_masks())
-        elif (self.path / "backgrounds").is_dir():
+        elif os.path.isdir(self.path / "backgrounds"):
             text = f"none yet: ico3d capture masks {self.path} makes them from the clean plates"
             findings.append(Finding("mask files", "warn", text))
         if self._track is not None:

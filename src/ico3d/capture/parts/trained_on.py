@@ -1,6 +1,7 @@
 """Which pictures of which recording trained a model, so that nobody takes them for tests."""
 
 import hashlib
+import os
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
@@ -24,7 +25,7 @@ def trained_on(capture: Capture, cameras: Iterable[int], frames: Sequence[int]) 
         of first and last frame of each run).
     """
     return {
-        "path": str(capture.path.resolve()),
+        "path": os.path.realpath(capture.path),
         "fingerprint": fingerprint(capture),
         "cameras": [capture.cameras[camera].name for camera in cameras],
         "frames": _runs(frames),
@@ -67,7 +68,7 @@ def check_told(summary: object) -> None:
 
 def is_same_recording(record: dict, capture: Capture) -> bool:
     """Whether a record of `trained_on` tells of this recording."""
-    if record.get("path") == str(capture.path.resolve()):
+    if record.get("path") == os.path.realpath(capture.path):
         return True
     return "fingerprint" in record and record["fingerprint"] == fingerprint(capture)
 

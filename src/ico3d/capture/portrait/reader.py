@@ -1,6 +1,7 @@
 """Reads the talking-portrait layout, written by ico3d or by other programs."""
 
 import io
+import os
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -48,7 +49,7 @@ class TalkingPortrait(RecordedCapture):
             CaptureError: If a file is missing or damaged; the sentence names file and frame.
         """
         self.path = path
-        self._details = read_json(path / DETAILS) if (path / DETAILS).is_file() else {}
+        self._details = read_json(path / DETAILS) if os.path.isfile(path / DETAILS) else {}
         parts = {name: read_json(path / f"transforms_{name}.json") for name in ("train", "val")}
         ids = {name: _ids(path, name, part) for name, part in parts.items()}
         self.split = Split(ids["train"], ids["val"])
@@ -77,12 +78,12 @@ class TalkingPortrait(RecordedCapture):
         Raises:
             CaptureError: If the frame's picture is missing.
         """
-        return frame in self._poses and self._recorded(frame).is_file()
+        return frame in self._poses and os.path.isfile(self._recorded(frame))
 
     def has_mask(self, camera: int, frame: int) -> bool:
         """Whether the frame has a soft mask or was parsed."""
         files = (self.path / "alpha" / f"{frame}.png", self._parsing_file(frame))
-        return frame in self._poses and any(file.is_file() for file in files)
+        return frame in self._poses and any(os.path.isfile(file) for file in files)
 
     def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
         """The person on the clean plate if the folder has one, else the recorded picture; uint8."""
@@ -93,7 +94,7 @@ class TalkingPortrait(RecordedCapture):
     def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
         """The soft mask that ico3d writes, else all pixels not parsed as background; uint8."""
         soft = self.path / "alpha" / f"{frame}.png"
-        if frame in self._poses and soft.is_file():
+        if frame in self._poses and os.path.isfile(soft):
             return cut_out(_picture(soft), box)
         parsing = self._parsing(frame)
         if parsing is None:
@@ -108,7 +109,7 @@ class TalkingPortrait(RecordedCapture):
     def background(self, camera: int) -> np.ndarray | None:
         """The clean plate `bc.jpg`."""
         plate = self.path / "bc.jpg"
-        return unit(_picture(plate)) if plate.is_file() else None
+        return unit(_picture(plate)) if os.path.isfile(plate) else None
 
     def torso(self, camera: int, frame: int) -> np.ndarray | None:
         """(H, W, 4) neck and clothes of `torso_imgs`, with their opacity.
@@ -117,7 +118,7 @@ class TalkingPortrait(RecordedCapture):
             CaptureError: If the file is damaged or has no opacity.
         """
         file = self.path / "torso_imgs" / f"{frame}.png"
-        if frame not in self._poses or not file.is_file():
+        if frame not in self._poses or not os.path.isfile(file):
             return None
         with _reading(file, lambda: open_picture(file, str(file))) as picture:
             if picture.mode != "RGBA":
@@ -147,7 +148,7 @@ class TalkingPortrait(RecordedCapture):
             CaptureError: If the file is damaged.
         """
         path = self.path / "ori_imgs" / f"{frame}.lms"
-        if frame not in self._poses or not path.is_file():
+        if frame not in self._poses or not os.path.isfile(path):
             return None
         points = _reading(path, lambda: load_landmarks(path))
         if points.shape != (68, 2) or not np.isfinite(points).all():
@@ -157,7 +158,7 @@ class TalkingPortrait(RecordedCapture):
     def head_points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) tracked face with a guessed body around it, or a guess of both."""
         path = self.path / "points.npy"
-        if not path.is_file():
+        if not os.path.isfile(path):
             return unknown_person()
         points = read_numbers(path)
         if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
@@ -179,7 +180,7 @@ class TalkingPortrait(RecordedCapture):
     def _blendshapes(self) -> np.ndarray | None:
         """(N, 52) float32 of `bs.npy`."""
         path = self.path / "bs.npy"
-        if not path.is_file():
+        if not os.path.isfile(path):
             return None
         return read_numbers(path).astype(np.float32)
 
@@ -187,7 +188,7 @@ class TalkingPortrait(RecordedCapture):
     def _action_units(self) -> dict[str, np.ndarray] | None:
         """The columns of `au.csv` that are used; OpenFace puts a space before their names."""
         path = self.path / "au.csv"
-        if not path.is_file():
+        if not os.path.isfile(path):
             return None
         # OpenFace's tables have megabytes, and as one text up to four times as many
         lines = io.TextIOWrapper(io.BytesIO(_reading(path, lambda: read_small(path))), "utf-8")
@@ -251,7 +252,7 @@ class TalkingPortrait(RecordedCapture):
     def _parsing(self, frame: int) -> np.ndarray | None:
         """The parsing picture of a frame with a face, uint8 RGB."""
         path = self._parsing_file(frame)
-        if frame not in self._poses or not path.is_file():
+        if frame not in self._poses or not os.path.isfile(path):
             return None
         return _picture(path, "RGB")
 
@@ -266,7 +267,7 @@ class TalkingPortrait(RecordedCapture):
             CaptureError: If there is neither.
         """
         for folder in ("gt_imgs", "ori_imgs"):
-            if (file := self.path / folder / f"{frame}.jpg").is_file():
+            if os.path.isfile(file := self.path / folder / f"{frame}.jpg"):
                 return file
         raise CaptureError(
             f"{self.path}: frame {frame} is listed in the transforms, but ori_imgs/{frame}.jpg is "
@@ -381,7 +382,7 @@ def _reading(path: Path, read: Callable[[], Result]) -> Result:
 
 def _numbers(folder: Path, suffix: str) -> set[int]:
     """The numbers that are file names in a folder."""
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         return set()
     return {
         int(p.stem) for p in folder.iterdir() if p.suffix == suffix and _NUMBER.fullmatch(p.stem)

@@ -1,5 +1,6 @@
 """Tracks a video of somebody talking and writes a capture in the talking-portrait layout."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ def track_portrait(
         MissingExtraError: If MediaPipe is not installed.
         MissingModelError: If the face model is not installed.
     """
-    if out.exists():
+    if os.path.exists(out):
         raise CaptureError(f"{out} exists already: remove it or choose another folder.")
     model = model_file("face_landmarker.task", "tracking a portrait")
     opened = open_video(video, settings.size)

@@ -1,5 +1,6 @@
 """Finds the files of a RenderMe-360 recording."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,18 +50,18 @@ def find_files(path: Path) -> Files:
     Raises:
         CaptureError: If the folder holds several recordings, or pictures are missing.
     """
-    if path.is_file() and not path.stem.endswith(RAW):
+    if os.path.isfile(path) and not path.stem.endswith(RAW):
         raise CaptureError(f"{path} has no pictures: name the file that ends in _raw.smc instead.")
     raws = [p for p in _candidates(path) if p.stem.endswith(RAW)]
     raw = only_one(path, raws)
     name = f"{raw.stem.removesuffix(RAW)}{ANNOTATIONS}.smc"
     places = [raw.with_name(name), _in_annotations(raw.absolute()).with_name(name)]
-    return Files(raw, next((place for place in places if place.is_file()), None))
+    return Files(raw, next((place for place in places if os.path.isfile(place)), None))
 
 
 def _candidates(path: Path) -> list[Path]:
     """The file itself, or those in a folder."""
-    return smc_files(path) if path.is_dir() else [path] if path.suffix == ".smc" else []
+    return smc_files(path) if os.path.isdir(path) else [path] if path.suffix == ".smc" else []
 
 
 def _in_annotations(raw: Path) -> Path:

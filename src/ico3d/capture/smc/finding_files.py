@@ -1,5 +1,6 @@
 """Finds the SMC file of a recording in a folder."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,9 +9,9 @@ from ico3d.errors import CaptureError
 
 def smc_files(folder: Path) -> list[Path]:
     """SMC files in a folder, sorted by name."""
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         return []
-    return sorted(p for p in folder.iterdir() if p.suffix == ".smc" and p.is_file())
+    return sorted(p for p in folder.iterdir() if p.suffix == ".smc" and os.path.isfile(p))
 
 
 def only_one(folder: Path, mains: Sequence[Path]) -> Path:

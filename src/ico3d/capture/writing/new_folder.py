@@ -42,7 +42,7 @@ def new_folder(
     Raises:
         CaptureError: If `out` exists.
     """
-    if out.exists():
+    if os.path.exists(out):
         raise CaptureError(f"{out} exists already: remove it or choose another folder.")
     out.parent.mkdir(parents=True, exist_ok=True)
     _remove_left(out)
@@ -54,7 +54,7 @@ def new_folder(
         (work / UNFINISHED).unlink()
         work.rename(out)
     finally:
-        shutil.rmtree(work, ignore_errors=True)
+        files.remove_folder(work)
         os.close(lock)
 
 
@@ -94,7 +94,7 @@ def _begun(out: Path) -> tuple[Path, int]:
         work = out.with_name(f".{out.name}.{secrets.token_hex(4)}")
         work.mkdir()  # not mkdtemp: who may read it is for the umask to say
         lock = _locked(work)
-        if lock is not None and work.is_dir():
+        if lock is not None and os.path.isdir(work):
             return work, lock
         if lock is not None:  # another process took it for a left one, before it was locked
             os.close(lock)
@@ -105,9 +105,9 @@ def _remove_left(out: Path) -> None:
     for folder in out.parent.iterdir():
         if not is_unfinished(folder.name) or folder.name[1:-9] != out.name:
             continue
-        lock = None if folder.is_symlink() else _locked(folder)
+        lock = None if os.path.islink(folder) else _locked(folder)
         if lock is not None:
-            shutil.rmtree(folder, ignore_errors=True)
+            files.remove_folder(folder)
             os.close(lock)
 
 

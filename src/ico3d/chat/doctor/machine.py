@@ -47,7 +47,7 @@ def of_page() -> Finding:
     """Whether there is a page to serve."""
     from ico3d.chat.serving.server import STATIC
 
-    if (STATIC / "index.html").is_file():
+    if os.path.isfile(STATIC / "index.html"):
         return good("the page is built")
     return bad("the page is not built", "run `make viewer`.")
 

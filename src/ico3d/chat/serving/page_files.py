@@ -22,6 +22,8 @@ from starlette.responses import Response, StreamingResponse
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Receive, Scope, Send
 
+from ico3d.common.files import resolved
+
 ENCODINGS = {"br": ".br", "gzip": ".gz"}
 """Content codings and the suffixes of compressed files, the smallest first."""
 HASHED = "assets"
@@ -65,7 +67,7 @@ class PageFiles(StaticFiles):
     def __init__(self, folder: Path):
         """Serves the files of `folder`; / gives `index.html`, /NAME also `NAME.html`."""
         super().__init__(directory=folder, html=True)
-        self._hashed = folder.resolve() / HASHED
+        self._hashed = resolved(folder) / HASHED
         self._turns = asyncio.Semaphore(AT_ONCE)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -102,7 +104,7 @@ class PageFiles(StaticFiles):
         """The file in the best coding that the request accepts; 304 if the browser has it."""
         plain, request = Path(full_path), Headers(scope=scope)
         forms = {name: Path(f"{plain}{suffix}") for name, suffix in ENCODINGS.items()}
-        forms = {name: file for name, file in forms.items() if file.is_file()}
+        forms = {name: file for name, file in forms.items() if os.path.isfile(file)}
         chosen = preferred(request.get("accept-encoding", ""), forms)
         file = forms.get(chosen, plain)
         stat = file.stat() if chosen else stat_result

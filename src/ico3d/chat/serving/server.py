@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import gc
+import os
 import socket
 from collections.abc import AsyncIterator, Collection, Sequence
 from pathlib import Path
@@ -143,7 +144,7 @@ def add_page(app: FastAPI) -> None:
     Browsers that come by a wrong address read so in plain words.
     """
     app.add_exception_handler(404, tell_missing)
-    if (STATIC / "index.html").is_file():
+    if os.path.isfile(STATIC / "index.html"):
         app.mount("/", PageFiles(STATIC))
         return
 

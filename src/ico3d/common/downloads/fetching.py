@@ -72,7 +72,7 @@ def fetch(weights: Weights) -> Path:
     if isinstance(package, FilesPackage):
         return unpack(package, folder)
     for file in weights.files:
-        if not (folder / file.name).is_file():
+        if not os.path.isfile(folder / file.name):
             _fetch_or_make(file, package, folder, 2 * weights.size + _FREE)
     return folder / weights.files[0].name if len(weights.files) == 1 else folder
 
@@ -147,7 +147,7 @@ def fetch_file(file: RemoteFile, folder: Path, most: int) -> Path:
 
 def _download(url: str, part: Path, most: int) -> None:
     """Adds to a file what it lacks of a download, which is removed where it is too large."""
-    have = part.stat().st_size if part.exists() else 0
+    have = part.stat().st_size if os.path.exists(part) else 0
     request = urllib.request.Request(url, headers={"User-Agent": "ico3d"})
     if have:
         request.add_header("Range", f"bytes={have}-")

@@ -121,7 +121,7 @@ class Trial:
         # Optical flow is the same for all trials, and was measured when the windows were cut.
         copy_cache(self.terms.folder / "flow", self.folder / "flow")
         body = train_body(capture, self.folder, job)
-        if not (self.folder / UNTUNED).is_file():
+        if not os.path.isfile(self.folder / UNTUNED):
             return {"seed": self.seed} | self._scores(body, capture)
         before = self._scores(TrainedBody.load(self.folder, UNTUNED), capture)
         return {"seed": self.seed} | before | {"tuned": self._scores(body, capture)}
@@ -243,7 +243,7 @@ def _share(threads: int) -> None:
 def _logged(trial: Trial) -> dict:
     trial.folder.mkdir(parents=True, exist_ok=True)
     path = trial.folder / "log.txt"
-    if path.is_symlink():
+    if os.path.islink(path):
         path.unlink()
     with path.open("a") as log, redirect_stdout(log), redirect_stderr(log):
         return trial.run()

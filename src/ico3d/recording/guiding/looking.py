@@ -78,7 +78,7 @@ class Looks:
         self._running[process] = file
         slow = threading.Timer(SLOWEST * seconds, process.kill)
         slow.start()
-        if self._is_closed or not file.exists():  # the end came before the process was known
+        if self._is_closed or not os.path.exists(file):  # the end came before the process was known
             process.kill()
         try:
             assert process.stdout is not None
@@ -92,7 +92,7 @@ class Looks:
         if self._is_closed:
             raise CaptureError(f"{file.name}: the server ended while it was looked at.")
         if status < 0:
-            raise costly() if file.exists() else nothing_arrived()
+            raise costly() if os.path.exists(file) else nothing_arrived()
         if status:
             raise CaptureError(f"{file.name}: the process that looks at parts has failed.")
         return _answer(json.loads(told))

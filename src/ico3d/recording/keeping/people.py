@@ -1,10 +1,13 @@
 """The folder of all recordings: whose there are, and how one begins."""
 
+import contextlib
 import json
 import logging
+import os
 import re
 import secrets
 import shutil
+import stat
 import unicodedata
 from datetime import date
 from pathlib import Path
@@ -57,15 +60,17 @@ class People:
         Raises:
             Refused: If there is nobody of this name.
         """
-        if not self._is_here(checked_name(name)):
+        kept = checked_name(name)  # a folder that was brought may spell it otherwise
+        here = [one for one in (kept, name) if is_name(one) and self._is_here(one)]
+        if not here:
             raise Refused("unknown", f"nothing is recorded of {name[:40]}.", 404)
-        return Person(self.folder / checked_name(name))
+        return Person(self.folder / here[0])
 
     def _is_here(self, name: str) -> bool:
         """Whether somebody agreed, and their files lie in this folder, not behind a link."""
         folder = self.folder / name
         places = folder, folder / CONSENT_FILE, folder / PARTS, folder / MAKING
-        return (folder / CONSENT_FILE).is_file() and not any(map(Path.is_symlink, places))
+        return not any(map(os.path.islink, places)) and os.path.isfile(folder / CONSENT_FILE)
 
     def begin(
         self, name: str, language: str, agreed: bool, today: date, voice: bool = False
@@ -126,13 +131,29 @@ class People:
             Refused: If there is nobody of this name.
             SettingsError: If something cannot be removed; the sentence names it.
         """
-        folder = self.person(name).folder
-        gone = self.folder / f".{folder.name}.{secrets.token_hex(8)}.gone"
+        remove(self.set_aside(self.person(name).folder))
+
+    def set_aside(self, path: Path) -> list[Path]:
+        """Hides a file or folder of somebody, however large, at once: nobody writes there again.
+
+        Returns:
+            What is to be removed, as `clear` does at the next start if nobody does so before;
+            nothing where there is none.
+
+        Raises:
+            SettingsError: If it cannot be renamed.
+        """
+        gone = self.folder / f".{path.name}.{secrets.token_hex(8)}.gone"
         try:
-            folder.rename(gone)  # from now on nobody finds it who would write there
+            if os.path.isdir(path) and not os.path.islink(path):
+                with contextlib.suppress(OSError):  # only who may write there may move it
+                    path.chmod(stat.S_IRWXU)
+            path.rename(gone)
+        except FileNotFoundError:
+            return []
         except OSError as error:
-            raise SettingsError(f"{folder} cannot be removed ({error.strerror}).") from error
-        remove([gone])
+            raise SettingsError(f"{path} cannot be removed ({error.strerror}).") from error
+        return [gone]
 
     def clear(self) -> None:
         """Removes what is left of removals that were killed; what cannot be removed is logged."""

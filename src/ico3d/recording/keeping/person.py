@@ -2,6 +2,7 @@
 
 import fnmatch
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,7 +119,7 @@ class Person:
             OSError: If they cannot be written.
         """
         file = self._take(id, take)
-        size = file.stat().st_size if file.is_file() else 0
+        size = file.stat().st_size if os.path.isfile(file) else 0
         if offset + len(data) > (MOST_UPLOADED if id == UPLOAD else MOST_BYTES):
             raise Refused("large", "this is longer than is recorded: stop, and begin anew.", 413)
         if offset + len(data) <= size:
@@ -146,7 +147,7 @@ class Person:
             Refused: If there is none.
         """
         file = self._take(id, take)
-        if not file.is_file():
+        if not os.path.isfile(file):
             raise nothing_arrived()
         return file
 
@@ -173,7 +174,7 @@ class Person:
     def remove(self, id: str) -> None:
         """Removes a part, its takes and what was found in it."""
         for file in self._parts.glob(f"{checked_id(id)}.*"):
-            if file.is_symlink() or not file.is_dir():
+            if os.path.islink(file) or not os.path.isdir(file):
                 file.unlink()
         if id == CONSENT:
             self._state(TICKED_AND_SPOKEN, TICKED)
@@ -190,7 +191,7 @@ class Person:
         if not (take.isascii() and take.isalnum() and len(take) <= 32):
             raise Refused("part", "a take has a name of letters and digits.", 404)
         file = self._parts / f"{checked_id(id)}.{take}{UNFINISHED}"
-        if file.is_symlink():
+        if os.path.islink(file):
             raise Refused("part", "a link to elsewhere is no take.", 404)
         return file
 

@@ -2,14 +2,16 @@
 
 import contextlib
 import logging
-import shutil
+import os
 import signal
 import subprocess
 import threading
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
+from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.packaged import NAME
 from ico3d.common.files import remove_unfinished
 from ico3d.creating.settings import QUALITIES, QualityName
@@ -112,17 +114,17 @@ class Makers:
         if not sources(person):
             said = "nothing is recorded: record some parts, or choose a video."
             raise Refused("nothing", said, 409)
-        with self._lock:
+        with self._clearing() as gone:
             if busy := self._busy():
                 raise Refused("busy", f"an avatar of {busy[0]} is being made: wait for it.", 409)
             folder = Places(person.folder).folder
             if anew:
-                shutil.rmtree(folder, ignore_errors=True)
+                gone += self._people.set_aside(folder)
             folder.mkdir(exist_ok=True)
             of = self._made_of(person)
             write_progress(folder, begun(folder, cast(QualityName, quality), of))
             log_file = folder / LOG
-            if log_file.is_symlink() or not log_file.is_file():  # nothing of ours
+            if os.path.islink(log_file) or not os.path.isfile(log_file):  # nothing of ours
                 log_file.unlink(missing_ok=True)
             with log_file.open("ab") as log:
                 words = [str(person.folder), quality, *of["on"]]
@@ -171,9 +173,9 @@ class Makers:
 
     def discard(self, person: Person) -> None:
         """Removes what was made so far; recordings and a finished avatar stay."""
-        with self._lock:
+        with self._clearing() as gone:
             self._stop(person)
-            shutil.rmtree(Places(person.folder).folder, ignore_errors=True)
+            gone += self._people.set_aside(Places(person.folder).folder)
 
     def withdraw(self, person: Person, id: str) -> None:
         """Removes a part with all that was made of it on the way; a finished avatar stays.
@@ -189,15 +191,25 @@ class Makers:
             Refused: If there is no such part.
         """
         places, id = Places(person.folder), checked_id(id)
-        with self._lock:
+        with self._clearing() as gone:
             found = read_progress(places.folder)
             if found is not None and (id == CONSENT or found.is_of(id)):
                 self._stop(person)
                 remove_unfinished(places.folder)
-                shutil.rmtree(places.work, ignore_errors=True)
+                gone += self._people.set_aside(places.work)
                 for file in (places.joined, places.joined_of, places.made):
                     file.unlink(missing_ok=True)
             person.remove(id)
+
+    @contextlib.contextmanager
+    def _clearing(self) -> Iterator[list[Path]]:
+        """Holds the lock, and removes what is listed meanwhile when others need not wait for it."""
+        gone: list[Path] = []
+        try:
+            with self._lock:
+                yield gone
+        finally:
+            remove(gone)
 
     def changed(self, person: Person, progress: Progress) -> list[str]:
         """What is another since a making began: `parts`, `on` (the body), both or nothing."""

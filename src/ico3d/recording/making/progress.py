@@ -12,7 +12,17 @@ from PIL import Image
 
 from ico3d.common.files import write_atomic
 from ico3d.common.typed import plain
-from ico3d.creating.events import Advanced, Event, Looked, Made, Planned, Preview, Step, Voiced
+from ico3d.creating.events import (
+    STEPS,
+    Advanced,
+    Event,
+    Looked,
+    Made,
+    Planned,
+    Preview,
+    Step,
+    Voiced,
+)
 from ico3d.creating.looking.advice import Advice, Level
 from ico3d.creating.settings import QualityName
 from ico3d.recording.keeping.noted import noted
@@ -94,8 +104,9 @@ def read_progress(folder: Path) -> Progress | None:
             return None
         left = None if found.left is None else float(found.left)
         numbers = {"left": left, "later": float(found.later), "told": float(found.told)}
+        seen = (*numbers.values(), found.decibels)
         lists = {"advice": tuple(found.advice), "refused": tuple(found.refused)}
-        if not all(math.isfinite(number or 0.0) for number in numbers.values()):
+        if not all(math.isfinite(number or 0.0) for number in seen):
             return None
         return replace(found, made_of=dict(found.made_of), **numbers, **lists)
     except (OSError, ValueError, TypeError, KeyError, OverflowError):
@@ -105,7 +116,8 @@ def read_progress(folder: Path) -> Progress | None:
 def _is_sound(found: Progress) -> bool:
     """Whether all is of its kind in what was read, but for numbers: it may be a stranger's."""
     known = found.state in get_args(State) and found.quality in get_args(QualityName)
-    texts = all(isinstance(text, str) for text in (found.step, found.error, found.code))
+    known = known and found.step in ("join", *STEPS)
+    texts = all(isinstance(text, str) for text in (found.error, found.code))
     share = isinstance(found.share, (int, float)) and 0 <= found.share <= 1
     counted = isinstance(found.faces, int) and 0 <= found.faces <= MOST_FACES
     good = found.decibels is None or isinstance(found.decibels, (int, float))

@@ -1,5 +1,6 @@
 """Starts and stops the servers of finished avatars."""
 
+import os
 import re
 import subprocess
 import threading
@@ -31,7 +32,7 @@ class Talks:
         Raises:
             Refused: If the avatar is not made, or cannot be served.
         """
-        if not avatar.is_file():
+        if os.path.islink(avatar) or not os.path.isfile(avatar):
             raise Refused("unmade", "the avatar is not made yet.", 409)
         with self._lock:
             process, url = self._running.pop(avatar.stem, (None, ""))

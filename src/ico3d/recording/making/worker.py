@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ico3d.avatar.embodying.look import UNCHANGED, Look
+from ico3d.avatar.forgetting.removal import remove
 from ico3d.common.files import json_of, write_atomic
 from ico3d.common.unpacking.limits import limit_to_free_memory
 from ico3d.common.unpacking.memory import ran_out
@@ -95,8 +96,8 @@ def _video(person: Person, places: Places) -> Path:
         raise CaptureError.of("nothing")
     now = signature(files)
     video = files[0] if files[0].stem == UPLOAD else places.joined
-    if _before(places) != now or not video.is_file():
-        shutil.rmtree(places.work, ignore_errors=True)
+    if _before(places) != now or os.path.islink(video) or not os.path.isfile(video):
+        remove([places.work])
         places.made.unlink(missing_ok=True)
         places.joined.unlink(missing_ok=True)
         if video == places.joined:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
@@ -64,7 +65,7 @@ class EncoderTraining:
         self._optimiser = torch.optim.AdamW(parameters, settings.learning_rate, weight_decay=0.01)
         self.step = 0
         self._checkpoint = checkpoint
-        if checkpoint.exists():
+        if os.path.exists(checkpoint):
             self._resume()
 
     def run(self) -> Iterator[dict[str, float]]:

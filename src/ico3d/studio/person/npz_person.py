@@ -3,6 +3,7 @@
 The layout is described in `docs/captures/synthetic.md`, "Subject files".
 """
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -115,7 +116,7 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
     Raises:
         CaptureError: If the file is missing, is not in npz format, or lacks an array.
     """
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise CaptureError(f"there is no subject file {path}: name an .npz file, or 'anny'.")
     try:
         arrays = read_npz(path, LARGEST)

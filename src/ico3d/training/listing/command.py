@@ -1,5 +1,6 @@
 """The verb `ico3d runs`."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,7 +37,7 @@ class Runs:
         from ico3d.errors import SettingsError, printable
         from ico3d.training.listing.find_runs import find_runs
 
-        if not self.folder.is_dir():
+        if not os.path.isdir(self.folder):
             raise SettingsError(f"there is no folder at {self.folder}.")
         console = Console(highlight=False, soft_wrap=True, markup=False)
         runs = find_runs(self.folder)
@@ -44,7 +45,7 @@ class Runs:
             for line in lines(run, time.time()):
                 console.print(printable(line))
         if not runs:
-            console.print(f"no trainings in {self.folder.resolve()} or below.")
+            console.print(f"no trainings in {os.path.realpath(self.folder)} or below.")
 
 
 def lines(run: "Run", now: float) -> list[str]:

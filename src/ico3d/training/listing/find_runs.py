@@ -116,14 +116,14 @@ class _Node:
     @cached_property
     def is_finished(self) -> bool:
         """Whether all is made."""
-        return self.state.done or (self.path / FINISHED).is_file()
+        return self.state.done or os.path.isfile(self.path / FINISHED)
 
     @cached_property
     def saved(self) -> tuple[int, list[str]]:
         """The step of the latest checkpoint that can be used, and what is wrong with newer ones."""
         faults = []
         for file in (self.path / name for name in CHECKPOINTS):
-            if not file.is_file():
+            if not os.path.isfile(file):
                 continue
             try:
                 return usable_step(file), faults
@@ -201,7 +201,7 @@ def _judged(node: _Node) -> tuple[State, str]:
 
 def _command(node: _Node) -> str:
     """The command by which a run goes on, where it now is."""
-    state, now = node.state, str(node.path.resolve())
+    state, now = node.state, os.path.realpath(node.path)
     if not _is_training(state.command):  # whoever wrote the notes may want something else run
         return ""
     words = list(state.command)
@@ -256,7 +256,7 @@ def _nodes(folder: Path) -> list[_Node]:
 def _node(folder: Path) -> _Node | None:
     """A folder as a run; None if it is none."""
     for name, lock in ABOUT.items():
-        if not (folder / name).is_file():
+        if not os.path.isfile(folder / name):
             continue
         about = read_object(folder / name)
         kind = next((kind for entry, kind in KINDS.items() if entry in about), None)
@@ -269,7 +269,7 @@ def _node(folder: Path) -> _Node | None:
 
 def _has_trained(folder: Path) -> bool:
     """Whether a folder whose settings are damaged is that of a run."""
-    return any((folder / name).is_file() for name in (STATE, METRICS, *CHECKPOINTS))
+    return any(os.path.isfile(folder / name) for name in (STATE, METRICS, *CHECKPOINTS))
 
 
 def _expected(about: dict, kind: str) -> int | None:

@@ -106,7 +106,7 @@ def lets_go(train: Callable[P, T]) -> Callable[P, T]:
 
 def is_locked(file: Path) -> bool:
     """Whether a process holds the lock of a file or folder; False where there is none."""
-    if not (file.is_file() or file.is_dir()):  # nobody opens a pipe on the other side
+    if not (os.path.isfile(file) or os.path.isdir(file)):  # nobody opens a pipe on the other side
         return False
     try:
         opened = os.open(file, os.O_RDONLY)

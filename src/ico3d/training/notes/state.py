@@ -71,7 +71,7 @@ def begun(folder: Path) -> None:
     told: dict[str, Any] = {"failed": None, "done": False}
     if command is not None:
         command.runs.append(folder)
-        told |= {"command": command.words, "folder": os.getcwd(), "path": str(folder.resolve())}
+        told |= {"command": command.words, "folder": os.getcwd(), "path": os.path.realpath(folder)}
     note(folder, **told)
 
 

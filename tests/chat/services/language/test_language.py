@@ -197,6 +197,24 @@ async def test_a_server_that_knows_no_functions_is_asked_without(bundle):
     assert ["tools" in body for body in script.requests] == [True, False, False]
 
 
+async def test_a_server_that_cannot_read_one_function_is_asked_without(bundle):
+    """As llama.cpp, which makes a grammar of parameters, whose words these are."""
+    script = Script(lambda body: 400 if "tools" in body else ["Yes."])
+    script.refusal = "JSON schema conversion failed: Unrecognized schema: {}"
+    async with talking(bundle, script) as page:
+        assert await ask(page, "hi", 0) == ["Yes."]
+    assert ["tools" in body for body in script.requests] == [True, False]
+
+
+async def test_what_is_refused_without_functions_too_keeps_them(bundle):
+    script = Script(lambda body: 400 if len(script.requests) <= 2 else ["Yes."])
+    script.refusal = "busy"
+    async with talking(bundle, script) as page:
+        assert await ask(page, "hi", 0) != ["Yes."]
+        assert await ask(page, "hi", 1) == ["Yes."]
+    assert ["tools" in body for body in script.requests] == [True, False, True]
+
+
 async def test_a_model_that_only_calls_functions_is_made_to_speak(bundle):
     mood = Call("mood", {"name": "happy"})
     script = Script(lambda body: [mood] if "tools" in body else ["At last."])

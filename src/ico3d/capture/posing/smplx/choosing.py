@@ -1,5 +1,6 @@
 """Finds the user's SMPL-X model file for the parameters of a recording."""
 
+import os
 import re
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def chosen_model(capture: Capture, named: Path | None) -> Path | None:
         if found is None:
             _tell(gender, name)
         return found
-    if not named.is_file():
+    if not os.path.isfile(named):
         raise MissingModelError(f"there is no SMPL-X model {named}.")
     of = re.search(r"(?:^|[^a-z])(male|female|neutral)(?:[^a-z]|$)", named.stem.lower())
     if of and of[1] != gender:

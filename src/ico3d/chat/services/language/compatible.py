@@ -200,15 +200,25 @@ class CompatibleModel(OpenAILLMService):
             await push_text(self, parts.said)
 
     async def _asked(self, context: LLMContext) -> AsyncStream[ChatCompletionChunk]:
-        """Asks; once more without functions if the server refuses those."""
+        """Asks; once more without functions if the server may have refused those.
+
+        Servers do so in words of their own, for models that call none, and for functions whose
+        parameters they cannot make a grammar of.
+        """
         try:
             return await super().get_chat_completions(context)
         except APIStatusError as error:
-            if not self._functions_allowed or "tool" not in str(error).lower():
+            told = error.status_code in (400, 422) or "tool" in str(error).lower()
+            if not self._functions_allowed or not told:
                 raise
-            logger.warning(f"language goes on without functions, refused by {cause(error)}")
             self._functions_allowed = False
-            return await super().get_chat_completions(context)
+            try:
+                answer = await super().get_chat_completions(context)
+            except APIStatusError:
+                self._functions_allowed = True  # it was something else
+                raise error from None
+            logger.warning(f"language goes on without functions, refused by {cause(error)}")
+            return answer
 
 
 def _past_the_sdk(params: dict[str, Any]) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def find(settings: Settings) -> Path:
         MissingModelError: If no such model is installed; the sentence says how to get one.
         SettingsError: If the name is unknown.
     """
-    if settings.model not in NAMES and Path(settings.model).is_dir():
+    if settings.model not in NAMES and os.path.isdir(Path(settings.model)):
         return complete(Path(settings.model))
     names = candidates(settings)
     for name in names:
@@ -151,7 +151,7 @@ def complete(folder: Path) -> Path:
         MissingModelError: If a file is missing.
     """
     for name in NEEDED:
-        if not (folder / name).is_file():
+        if not os.path.isfile(folder / name):
             raise MissingModelError(f"the Whisper model in {folder} has no {name}: fetch it again.")
     return folder
 

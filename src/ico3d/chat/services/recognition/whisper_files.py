@@ -5,6 +5,7 @@ rows, and a token that is never to be said is struck out at its number, wherever
 """
 
 import json
+import os
 import re
 import struct
 from collections.abc import Iterator, Mapping
@@ -188,7 +189,7 @@ def _check_sound(path: Path, mels: int) -> None:
     Raises:
         ValueError: If no Whisper's is like that.
     """
-    told = _json(path, 1 << 20) if path.is_file() else {"feature_size": 80}
+    told = _json(path, 1 << 20) if os.path.isfile(path) else {"feature_size": 80}
     if mels not in MELS or told.get("feature_size", 80) != mels:
         raise ValueError(f"its sound has {told.get('feature_size')} bands, and it hears {mels}")
     for name, value in SOUND.items():
@@ -203,7 +204,7 @@ def _check_tokens(folder: Path, count: int) -> None:
         ValueError: If they are not.
     """
     settings = folder / "config.json"
-    told = _json(settings, 1 << 20) if settings.is_file() else {}
+    told = _json(settings, 1 << 20) if os.path.isfile(settings) else {}
     words = _json(folder / "tokenizer.json", LARGEST_TOKENIZER)
     numbers = [told.get(name) for name in ("lang_ids", "suppress_ids", "suppress_ids_begin")]
     numbers += [list(words["model"]["vocab"].values())]

@@ -5,6 +5,7 @@ The package piper-tts is licensed under GPL-3.0; it is an optional extra, loaded
 
 import functools
 import json
+import os
 from collections import deque
 from collections.abc import AsyncGenerator, Iterator
 from dataclasses import dataclass
@@ -53,7 +54,7 @@ def find_voice(settings: Settings) -> Path:
     names = f"{settings.voice}.onnx", f"{settings.voice}.onnx.json"
     places = [place for folder in model_folders() for place in (folder, folder / settings.voice)]
     for place in places:
-        if all((place / name).is_file() for name in names):
+        if all(os.path.isfile(place / name) for name in names):
             return place / names[0]
     fetch = f"python -m piper.download_voices --download-dir {model_folders()[-1]}"
     raise MissingModelError(

@@ -6,6 +6,7 @@ believed as far as its weights hold it: transformers makes up what is missing, a
 
 import json
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,7 @@ def _check(folder: Path, kept: dict[str, Any]) -> None:
     Raises:
         ModelError: If it does.
     """
-    if (folder / TOKENIZER).is_file():
+    if os.path.isfile(folder / TOKENIZER):
         _check_tokenizer(folder / TOKENIZER)
     settings = json.loads(read_small(folder / CONFIG, most=LARGEST_CONFIG))
     for name, value in _numbers(settings):

@@ -1,5 +1,6 @@
 """Qwen2-0.5B-Instruct in this process, through transformers."""
 
+import os
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,6 +10,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.language.sampling import check_sampling
 from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.common.files import resolved
 from ico3d.common.weights import cached, weights_named
 from ico3d.errors import MissingExtraError, MissingModelError
 
@@ -97,7 +99,7 @@ def _named(model: str) -> Path | None:
     A name on the hub is none of a folder, wherever a server is started.
     """
     if model.startswith((".", "~")) or Path(model).is_absolute():
-        return Path(model).expanduser().resolve()
+        return resolved(Path(model).expanduser())
     from huggingface_hub import try_to_load_from_cache
     from huggingface_hub.errors import HFValidationError
 
@@ -109,4 +111,5 @@ def _named(model: str) -> Path | None:
 
 
 def _is_whole(folder: Path) -> bool:
-    return (folder / "config.json").is_file() and any((folder / n).is_file() for n in WEIGHTS)
+    has_weights = any(os.path.isfile(folder / name) for name in WEIGHTS)
+    return has_weights and os.path.isfile(folder / "config.json")
