@@ -1,4 +1,4 @@
-"""What is done to the packaged avatar once she is baked: arms, clothes, the red of skin, lids."""
+"""What is done to the packaged avatar once she is baked: arms, clothes, colours, lids."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,6 +46,12 @@ REDDEST = (0.9, 1.4)
 """Joints that carry bare skin, and by how much the logit of its red exceeds those of green and blue
 at most: that of nineteen in twenty of the hands' Gaussians. Wool is blue and has none."""
 
+SEAM, BESIDE, BELOW = 0.065, 0.12, (0.038, 0.05, 0.126, 0.146)
+"""Metres from the middle within which the front of the trousers is evened, and up to where it
+shows how; metres under the hips where that begins, is whole, begins to end, and has ended. Shade
+between the legs and the end of a fly were no more than a spot to her cameras."""
+EVENED = 0.8
+"""Share of the difference that is taken away there."""
 AWAKE = 0.1
 """Share of the way that lids take as they close by which hers are wider open: those of the files
 hang low at rest, and people who saw her called her sleepy."""
@@ -55,7 +61,7 @@ def write_finished(path: Path) -> None:
     """Finishes a bundle that was just baked: arms, clothes, skin and gestures of its body, lids."""
     bundle = Bundle.open(path)
     assert bundle.skinned is not None
-    body = muted(tailored(narrower(bundle.skinned)))
+    body = evened(muted(tailored(narrower(bundle.skinned))))
     head, gestures = awake(bundle.require_head()[0]), gesture_files(body, (), 1.0)
     write_person(path, bundle, bundle.manifest, head, body, gestures)
 
@@ -94,6 +100,26 @@ def write_person(
     info = replace(manifest.head, num_rest=0)
     manifest = replace(manifest, head=info, skinned=replace(body.info, num_rest=0))
     write_bundle(path, *coarse_first(manifest, files))
+
+
+def evened(body: BakedSkinned) -> BakedSkinned:
+    """The body whose trousers are as plain between the legs as beside, in every pose."""
+    strongest = body.joints[np.arange(len(body.joints)), body.weights.argmax(1)]
+    legs = ("upperleg", "pelvis", "spine05")
+    hips = body.rig.joints[body.rig.names.index("upperleg01.L"), 1]
+    aside, under = np.abs(body.means[:, 0]), hips - body.means[:, 1]  # (N,), (N,)
+    trousers = np.array([name.startswith(legs) for name in body.rig.names])[strongest]
+    front = trousers & (body.means[:, 2] > 0) & (under > BELOW[0])
+    beside = front & (aside > SEAM) & (aside < BESIDE) & (under < BELOW[2])
+    logits = body.color_logits.astype(np.float64)
+    plain = np.median(logits[beside], axis=0)
+    inside = np.clip((SEAM - aside) / (SEAM / 2), 0, 1) * np.interp(under, BELOW, (0, 1, 1, 0))
+    share = EVENED * front * inside  # (N,)
+    logits += share[:, None] * (plain - logits)
+    shapes = body.shapes.astype(np.float64)
+    shapes[..., 3:] *= 1 - share[:, None, None]
+    changed = np.round(shapes).astype(np.int8)
+    return replace(body, color_logits=logits.astype(np.float16), shapes=changed)
 
 
 def awake(head: BakedHead) -> BakedHead:

@@ -136,7 +136,7 @@ def test_a_folder_is_removed_however_deep_and_links_lead_nowhere(tmp_path, monke
         (deepest / "file").touch()
         deepest.chmod(0o500)
         monkeypatch.setattr(files, "LONGEST", longest)
-        assert remove_folder(folder) == []
+        assert remove_folder(folder) is None
     assert [path.name for path in tmp_path.iterdir()] == ["kept"] and (kept / "file").exists()
 
 
@@ -147,12 +147,13 @@ def test_what_is_left_of_a_folder_is_told(tmp_path, monkeypatch):
     (folder / "goes").touch()
     unlink = os.unlink
 
-    def refuse(path):
+    def refuse(path: str) -> None:
         if path.endswith("stays"):
             raise PermissionError(1, "Operation not permitted")
         unlink(path)
 
     monkeypatch.setattr(os, "unlink", refuse)
-    assert remove_folder(folder)[0].strerror == "Operation not permitted"
+    fault = remove_folder(folder)
+    assert fault is not None and fault.strerror == "Operation not permitted"
     assert [place.name for place, _, _ in walk(folder)] == ["folder", "a"]
     assert not (folder / "goes").exists()

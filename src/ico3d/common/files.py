@@ -183,8 +183,14 @@ def read_small(file: Path, links: bool = True, most: int | None = None) -> bytes
 
 
 def resolved(path: Path) -> Path:
-    """As `Path.resolve`, but of anybody's links: one that leads to itself ends where it begins."""
-    return Path(os.path.realpath(path))
+    """As `Path.resolve`, but of anybody's links: one that cannot be followed ends where it is.
+
+    There are chains of thousands of links, circles, and links that only their owner may read.
+    """
+    try:
+        return Path(os.path.realpath(path))
+    except (OSError, RecursionError):
+        return Path(os.path.abspath(path))
 
 
 def holds(file: Path, content: bytes) -> bool:
@@ -215,58 +221,59 @@ def first_entries(folder: Path, most: int) -> list[os.DirEntry[str]]:
         return []
 
 
-def remove_folder(folder: Path) -> list[OSError]:
-    """Removes a folder, which may be anybody's: nested as deep as you like, or not to be written.
+def remove_folder(folder: Path) -> OSError | None:
+    """Removes a folder, which may be anybody's: deep, crowded, or not to be written.
+
+    Names of one folder at each depth are all that it remembers.
 
     Args:
         folder: No link.
 
     Returns:
-        What went wrong where something is left; what vanishes meanwhile is no fault.
+        The first thing that went wrong where something is left; what vanishes meanwhile is no
+        fault.
     """
     faults: list[OSError] = []
-    waiting: list[str] = [os.fspath(folder)]
-    emptied: list[str] = []
-    while waiting:
-        place = waiting.pop()
-        emptied.append(place)
-        with suppress(OSError):  # of another user; it may go nevertheless
-            os.chmod(place, stat.S_IRWXU)
-        with _noted(faults):
-            waiting += _emptied(place, folder, faults)
-    for place in reversed(emptied):  # those within others first
-        with _noted(faults):
-            os.rmdir(place)
-    return faults if os.path.lexists(folder) else []
+    trail = [(os.fspath(folder), _names(folder, faults))]
+    while trail:
+        place, names = trail[-1]
+        if not names:
+            with _first(faults):
+                os.rmdir(place)
+            trail.pop()
+            continue
+        path = os.path.join(place, names.pop())
+        with _first(faults):
+            if not stat.S_ISDIR(os.lstat(path).st_mode):
+                os.unlink(path)
+            elif len(os.fsencode(path)) < LONGEST:
+                trail.append((path, _names(path, faults)))
+            else:  # from where it is too deep it is moved up
+                higher = secrets.token_hex(8)
+                os.rename(path, os.path.join(folder, higher))
+                trail[0][1].append(higher)
+    return faults[0] if faults and os.path.lexists(folder) else None
 
 
-def _emptied(place: str, top: Path, faults: list[OSError]) -> list[str]:
-    """Removes all but folders from a folder; the folders, of which too deep ones are moved up."""
-    folders: list[str] = []
-    with os.scandir(place) as entries:
-        listed = list(entries)
-    for entry in listed:
-        with _noted(faults):
-            if not entry.is_dir(follow_symlinks=False):
-                os.unlink(entry.path)
-            elif len(os.fsencode(entry.path)) < LONGEST:
-                folders.append(entry.path)
-            else:
-                higher = os.path.join(top, secrets.token_hex(8))
-                os.rename(entry.path, higher)
-                folders.append(higher)
-    return folders
+def _names(folder: Path | str, faults: list[OSError]) -> list[str]:
+    """What lies in a folder, which can be removed from it from now on."""
+    with suppress(OSError):  # of another user; it may go nevertheless
+        os.chmod(folder, stat.S_IRWXU)
+    with _first(faults):
+        return os.listdir(folder)
+    return []
 
 
 @contextmanager
-def _noted(faults: list[OSError]) -> Generator[None]:
-    """Notes what goes wrong, and goes on."""
+def _first(faults: list[OSError]) -> Generator[None]:
+    """Notes the first thing that goes wrong, and goes on."""
     try:
         yield
     except FileNotFoundError:
         pass
     except OSError as error:
-        faults.append(error)
+        if not faults:
+            faults.append(error)
 
 
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:

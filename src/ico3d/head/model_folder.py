@@ -1,7 +1,6 @@
 """A trained head with everything needed to drive it, as a model folder stores it."""
 
 import json
-import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -13,7 +12,7 @@ import torch
 from ico3d.capture.capture import Capture
 from ico3d.capture.parts.trained_on import check_told
 from ico3d.common.expression import EYE_NAMES, FACE_NAMES, SPEECH_SIZE, TURN_SIZE, EyeRange
-from ico3d.common.files import json_of, write_atomic
+from ico3d.common.files import json_of, resolved, write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import (
     BlendshapeTrack,
@@ -96,7 +95,7 @@ class TrainedHead:
                 capture is the training's recording but its head poses have changed.
         """
         trained_on = self.summary.get("recording", {})
-        same = trained_on.get("path") == os.path.realpath(capture.path)
+        same = trained_on.get("path") == str(resolved(capture.path))
         if same and trained_on.get("poses") != poses_digest(capture):
             raise ModelError(
                 f"the head poses of {capture.path} have changed since this head was trained with "

@@ -1,6 +1,5 @@
 """Trains a head on a capture and writes the model folder."""
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -19,6 +18,7 @@ from ico3d.capture.parts.trained_on import trained_on
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.common.expression import EyeRange, eye_range
+from ico3d.common.files import resolved
 from ico3d.errors import CaptureError
 from ico3d.head.blending.displacement import Displacement, principal, told
 from ico3d.head.expressions import (
@@ -71,7 +71,7 @@ class HeadJob:
 
     def about(self, capture: Path) -> dict:
         """Values that a run must share with an interrupted one to continue it."""
-        about = {"capture": os.path.realpath(capture), **asdict(self)}
+        about = {"capture": str(resolved(capture)), **asdict(self)}
         for name in ("hold_out", "over_torso"):
             if not about[name]:
                 del about[name]  # runs of earlier versions say nothing of it

@@ -34,7 +34,7 @@ from ico3d.recording.keeping.plan import CONSENT, part_ids, scripts
 from ico3d.recording.making.durations import Durations
 from ico3d.recording.making.makers import PACKAGED, Bodies, Makers
 from ico3d.recording.making.places import Places
-from ico3d.recording.making.progress import FACE
+from ico3d.recording.making.progress import shown_face
 from ico3d.recording.making.talks import Talks
 from ico3d.recording.presence import CLIENT_GONE, while_there
 from ico3d.recording.refusals import Refused, full_disk
@@ -284,10 +284,11 @@ def _add_making(app: FastAPI, room: Room) -> None:
 
     @app.get(making + "/face")
     async def face(name: str) -> Response:
-        file = Places(room.people.person(name).folder).folder / FACE
-        if not os.path.isfile(file) or os.path.islink(file):
+        folder = Places(room.people.person(name).folder).folder
+        picture = await asyncio.to_thread(shown_face, folder)
+        if picture is None:
             raise Refused("part", "there is no picture yet.", 404)
-        return FileResponse(file, media_type="image/jpeg", headers=NEVER_KEPT)
+        return Response(picture, media_type="image/jpeg", headers=NEVER_KEPT)
 
     @app.post(ROOT + "{name}/talk")
     async def talk(name: str) -> Response:

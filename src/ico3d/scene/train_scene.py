@@ -1,6 +1,5 @@
 """Trains a static scene on a capture and writes the model folder."""
 
-import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from ico3d.capture.capture import Capture
 from ico3d.common.device import DeviceName
+from ico3d.common.files import resolved
 from ico3d.scene.model_folder import TrainedScene
 from ico3d.scene.optimise import SceneTrainer
 from ico3d.scene.settings import SceneSettings, StrategyName
@@ -61,7 +61,7 @@ def train_scene(
             not work.
         ModelError: If training diverges.
     """
-    run = RunFolder(folder, {"capture": os.path.realpath(capture.path), **asdict(job)})
+    run = RunFolder(folder, {"capture": str(resolved(capture.path)), **asdict(job)})
     if run.finished() is not None:
         return TrainedScene.load(folder)
     settings = job.settings

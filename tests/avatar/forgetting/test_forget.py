@@ -20,17 +20,15 @@ from ico3d.avatar.forgetting.choosing import (
     remaining,
     within,
 )
-from ico3d.avatar.forgetting.holdings import ABOUT, RECORDINGS, RUN, Holding
+from ico3d.avatar.forgetting.holdings import Holding
 from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.archive import write_zip
-from ico3d.bundle.format import MANIFEST, write_bundle
+from ico3d.bundle.format import write_bundle
 from ico3d.bundle.people.provenance import Provenance
 from ico3d.cli import main
 from ico3d.common.files import MOST_ABOUT
 from support.bundles.random_bundle import random_files, random_head, random_manifest
 from support.recordings.multiview_folders import entry, ring, write_cameras
-from support.strangers.links import ODD_LINKS
-from support.strangers.nested import nested
 
 
 def recording(folder: Path, **stated: str) -> Path:
@@ -340,29 +338,6 @@ def test_a_strangers_folder_does_not_keep_anybody_from_being_forgotten(tmp_path,
     (model(work / "d") / "head.json").symlink_to("/dev/zero")
     assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
     assert not ada.exists() and stranger.exists()
-
-
-def test_folders_nested_deep_are_no_obstacle(tmp_path):
-    work = tmp_path / "work"
-    ada = bundle_in(work / "a", "Ada")
-    with nested(work):
-        assert main(["forget", "Ada", "--project", str(work), "--yes"]) == 0
-        assert not ada.exists()
-        assert main(["forget", str(work / "d"), "--project", str(work), "--yes"]) == 0
-    assert sorted(path.name for path in work.iterdir()) == ["a"]
-
-
-@pytest.mark.parametrize("leads_to", ODD_LINKS)
-def test_links_of_strangers_are_no_obstacle(tmp_path, leads_to):
-    ada = bundle_in(tmp_path / "ada", "Ada")
-    ours = recording(tmp_path / "ours", likeness="Ada")
-    for mark in (*RECORDINGS, MANIFEST, ABOUT, RUN, "b.ico3d"):
-        place = tmp_path / f"of {mark}"
-        place.mkdir()
-        (place / mark).symlink_to(mark if leads_to is None else leads_to)
-    (ours / "loop").symlink_to("loop" if leads_to is None else leads_to)
-    assert main(["forget", "Ada", "--project", str(tmp_path), "--yes"]) == 0
-    assert not ada.exists() and not ours.exists()
 
 
 def test_a_terminal_obeys_nothing_that_a_bundle_says(tmp_path, capsys):

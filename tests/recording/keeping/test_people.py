@@ -12,7 +12,7 @@ from ico3d.errors import SettingsError, StorageError
 from ico3d.recording.keeping import people as room
 from ico3d.recording.keeping.people import People
 from ico3d.recording.refusals import Refused
-from support.strangers.links import ODD_LINKS
+from support.strangers.links import ODD_LINKS, odd_link
 from support.strangers.nested import nested
 from support.studio_page.parts import DAY, begun, kept
 
@@ -196,21 +196,21 @@ def test_whose_files_lie_behind_a_link_is_nobody_and_is_not_named(tmp_path, plac
         People(tmp_path).person("Ida")
 
 
-@pytest.mark.parametrize("leads_to", ODD_LINKS)
-def test_a_link_that_cannot_be_followed_hides_nobody_else(tmp_path, leads_to):
+@pytest.mark.parametrize("kind", ODD_LINKS)
+def test_a_link_that_cannot_be_followed_hides_nobody_else(tmp_path, kind):
     ada = begun(tmp_path, "Ada")
     (tmp_path / "Bob").mkdir()
-    for link in (tmp_path / "Bob" / "consent.json", tmp_path / "Eve"):
-        link.symlink_to(link.name if leads_to is None else leads_to)
+    odd_link(tmp_path / "Bob" / "consent.json", kind)
+    (tmp_path / "Eve").symlink_to("Eve" if kind == "itself" else "e" * 300)
     people = People(tmp_path)
     assert people.names() == ["Ada"]
     for name in ("Bob", "Eve"):
         with pytest.raises(Refused, match="nothing is recorded"):
             people.person(name)
-    (ada.folder / "loop").symlink_to("loop" if leads_to is None else leads_to)
+    odd_link(ada.folder / "link", kind)
     left = tmp_path / ".Ida.0123456789abcdef.gone"
     left.mkdir()
-    (left / "loop").symlink_to("loop" if leads_to is None else leads_to)
+    odd_link(left / "link", kind)
     people.clear()
     people.delete("Ada")
     assert {path.name for path in tmp_path.iterdir()} == {"Bob", "Eve"}

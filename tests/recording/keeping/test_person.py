@@ -1,6 +1,7 @@
 """Parts while they are recorded: chunks in order, breaks, retakes, what is no video."""
 
 import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -133,6 +134,13 @@ def test_nothing_is_shown_or_written_behind_a_link(person, tmp_path):
     person.remove("text-1")
     assert not (parts / "text-1.webm").is_symlink()
     assert secret.read_bytes() == b"secret"
+
+
+def test_a_pipe_is_no_take(person):
+    """Whoever opens one waits for ever."""
+    kept(person, "left", WEBM)
+    os.mkfifo(person.folder / "parts" / "text-2.a1.part")
+    assert _codes(lambda: person.append("text-2", "a1", 0, WEBM)) == ("part", 404)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from ico3d.recording.making.progress import (
     Reporter,
     begun,
     read_progress,
+    shown_face,
     write_progress,
 )
 from support.strangers.not_ours import replacements
@@ -94,6 +95,17 @@ def test_why_there_is_no_voice_is_among_the_advice(tmp_path):
 ODD_PAIRS = [('"running"', text) for text in ("5", "null", '["x"]', '"better"', "{}")]
 DEEP = "[" * 700 + "]" * 700
 ODD_PAIRS += [(text, '"good"') for text in ("5", "null", '["x"]', '"going"')]
+
+
+def test_of_a_strangers_picture_nothing_is_shown_that_takes_gigabytes(tmp_path):
+    assert shown_face(tmp_path) is None
+    for kind, size in (("PNG", (64, 32)), ("JPEG", (5000, 16)), ("GIF", (64, 32))):
+        Image.new("L", size).save(tmp_path / FACE, kind)
+        assert shown_face(tmp_path) is None
+    Image.new("L", (4000, 2000)).save(tmp_path / FACE)
+    assert shown_face(tmp_path) == (tmp_path / FACE).read_bytes()
+    (tmp_path / FACE).write_bytes(bytes(2 << 20))
+    assert shown_face(tmp_path) is None
 
 
 def test_what_is_damaged_is_nothing(tmp_path):

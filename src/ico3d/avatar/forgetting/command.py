@@ -44,7 +44,7 @@ class Forget:
 
         from ico3d.avatar.forgetting.choosing import belonging, outermost, remaining, within
         from ico3d.avatar.forgetting.holdings import find_holdings
-        from ico3d.avatar.forgetting.removal import check_idle, remove, with_tracks
+        from ico3d.avatar.forgetting.removal import check_idle, links_in, remove, with_tracks
         from ico3d.errors import printable
 
         console = Console(highlight=False, soft_wrap=True, markup=False)
@@ -59,7 +59,8 @@ class Forget:
             console.print(printable(f"{path}{_described(inside)}"))
         self._ask(len(theirs))
         check_idle(theirs)
-        targets = remove(theirs)
+        targets = links_in(theirs)
+        remove(theirs)
         console.print(f"{len(theirs)} removed. What may remain elsewhere, and is not removed:")
         for sentence in (*targets, *remaining(holdings, chosen, theirs)):
             console.print(printable(f"- {sentence}"))

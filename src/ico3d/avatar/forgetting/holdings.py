@@ -10,7 +10,7 @@ from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import MANIFEST, Manifest
 from ico3d.capture.writing.new_folder import UNFINISHED, is_unfinished
-from ico3d.common.files import LONGEST, read_object, walk
+from ico3d.common.files import LONGEST, read_object, resolved, walk
 from ico3d.common.people.stated import BETWEEN, NOBODY, alike, is_stated
 from ico3d.errors import Ico3dError
 
@@ -83,7 +83,7 @@ def _walk(project: Path) -> Iterator[Holding]:
         if folder != project and (found := _folder(folder)) is not None:
             yield found
         for link in (folder / name for name in folders if os.path.islink(folder / name)):
-            place = os.path.realpath(link)
+            place = str(resolved(link))
             if place not in led_to:
                 led_to[place] = _folder(link)
             if (found := led_to[place]) is not None:

@@ -1,15 +1,19 @@
 """Removes files and folders, and says what that could not reach."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
 from ico3d.capture.headpose.track_file import track_file as head_track_file
-from ico3d.common.files import remove_folder, walk
+from ico3d.common.files import remove_folder, resolved, walk
 from ico3d.errors import SettingsError
 from ico3d.rig.body_track import track_file as body_track_file
 from ico3d.training.listing.find_runs import ABOUT
 from ico3d.training.notes.lock import is_locked
+
+MOST_TOLD = 100
+"""Links of which it is said what they led to."""
 
 
 def with_tracks(paths: Sequence[Path]) -> list[Path]:
@@ -34,43 +38,43 @@ def check_idle(paths: Sequence[Path]) -> None:
                 )
 
 
-def remove(paths: Sequence[Path]) -> list[str]:
+def remove(paths: Sequence[Path]) -> None:
     """Removes files and folders for good; links are removed, not what they lead to.
 
     Args:
         paths: None of them lies in another one.
 
-    Returns:
-        A sentence for each link, on what it led to.
-
     Raises:
         SettingsError: If something cannot be removed; all else is gone then.
     """
-    left, targets = [], []
+    left = []
     for path in paths:
         try:
-            if os.path.islink(path):
-                targets.append(f"{os.path.realpath(path)}, to which {path} led")
-                path.unlink()
-            elif os.path.isdir(path):
-                targets += _links_in(path)
-                if faults := remove_folder(path):
-                    raise faults[0]
+            if os.path.isdir(path) and not os.path.islink(path):
+                if fault := remove_folder(path):
+                    raise fault
             else:
                 path.unlink(missing_ok=True)
         except OSError as error:
             left.append(f"{path} ({error.strerror})")
     if left:
         raise SettingsError(f"all is gone but {', '.join(left)}: it cannot be removed.")
-    return targets
 
 
-def _links_in(folder: Path) -> list[str]:
-    """A sentence for each link below a folder, on what it leads to."""
+def links_in(paths: Sequence[Path]) -> list[str]:
+    """A sentence on what a link leads to, for the first `MOST_TOLD` among paths and below."""
     found = []
-    for place, folders, files in walk(folder):
-        links = (place / name for name in (*folders, *files))
-        found += [
-            f"{os.path.realpath(one)}, to which {one} led" for one in links if os.path.islink(one)
-        ]
+    for link in islice(_links(paths), MOST_TOLD + 1):
+        if len(found) == MOST_TOLD:
+            return [*found, "what further links led to"]
+        found.append(f"{resolved(link)}, to which {link} led")
     return found
+
+
+def _links(paths: Sequence[Path]) -> Iterator[Path]:
+    for path in paths:
+        if os.path.islink(path):
+            yield path
+            continue
+        for place, folders, files in walk(path):
+            yield from (place / one for one in (*folders, *files) if os.path.islink(place / one))

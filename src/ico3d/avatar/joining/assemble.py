@@ -75,9 +75,9 @@ class Assembly:
 
     def about(self, capture: Path) -> dict:
         """Settings that a run must share with an interrupted one to continue it."""
-        paths = {"head": os.path.realpath(self.head), "capture": os.path.realpath(capture)}
+        paths = {"head": str(resolved(self.head)), "capture": str(resolved(capture))}
         if self.continued:
-            paths["continued"] = os.path.realpath(self.continued)
+            paths["continued"] = str(resolved(self.continued))
         held = {"hold_out": True} if self.hold_out else {}
         return (
             paths

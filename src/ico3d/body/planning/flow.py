@@ -21,7 +21,7 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
-from ico3d.common.files import read_small, write_atomic, write_one_of_many
+from ico3d.common.files import read_small, resolved, write_atomic, write_one_of_many
 from ico3d.common.unpacking.npz import WIDTH, read_npz
 from ico3d.errors import CaptureError, ModelError
 from ico3d.splat.initial import in_pictures, spacing
@@ -274,7 +274,7 @@ class _Work:
         digest = hashlib.sha256()
         about = [VERSION, self.method.name, HEIGHT, MOVING, self.pixel, camera.width, camera.height]
         span = [self.index, self.span.first, self.span.last]
-        digest.update(json.dumps([*about, *span, os.path.realpath(self.capture.path)]).encode())
+        digest.update(json.dumps([*about, *span, str(resolved(self.capture.path))]).encode())
         digest.update(camera.intrinsics.tobytes() + camera.world_to_camera.tobytes())
         for frame in sorted(frames):
             for part in self.picture(frame) or ():

@@ -27,6 +27,7 @@ from ico3d.capture.parts.held_out import training_part
 from ico3d.capture.parts.trained_on import trained_on
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
+from ico3d.common.files import resolved
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
@@ -63,9 +64,9 @@ class BodyJob:
 
     def about(self, capture: Path) -> dict:
         """Values, beside the settings, that a run must share with an interrupted one."""
-        about = {"capture": os.path.realpath(capture), "method": self.method, "seed": self.seed}
+        about = {"capture": str(resolved(capture)), "method": self.method, "seed": self.seed}
         if self.continued is not None:
-            about["continued"] = os.path.realpath(self.continued)
+            about["continued"] = str(resolved(self.continued))
         if self.hold_out:
             about["hold_out"] = True
         return about | ({"companion": self.companion.about()} if self.companion else {})
@@ -287,10 +288,9 @@ def window_tasks(
     else:
         plan = plan_windows(capture, job, folder)
         windows, flow = plan.windows, plan.method
+    runs, flows = folder / "windows", folder / "flow"
     tasks = [
-        WindowTask(
-            capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
-        )
+        WindowTask(capture.path, runs / f"{index:04d}", flows, window, index, job)
         for index, window in enumerate(windows)
     ]
     return tasks, flow

@@ -71,10 +71,11 @@ class RayCluster:
 
     def start(self, task: WindowTask) -> None:
         """Submits a window to Ray."""
-        places = {name: resolved(getattr(task, name)) for name in ("capture", "folder", "flow")}
+        capture, folder, flow = map(resolved, (task.capture, task.folder, task.flow))
+        there = replace(task, capture=capture, folder=folder, flow=flow)
         # No retries by Ray: they would be neither counted per checkpoint nor shown.
         remote = self._ray.remote(max_retries=0, **self._needs)(work)
-        self._running[remote.remote(replace(task, **places), self._needs["num_cpus"])] = task
+        self._running[remote.remote(there, self._needs["num_cpus"])] = task
 
     def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
         """Waits at most `timeout` seconds until a window ends or its worker is lost.

@@ -1,7 +1,6 @@
 """Which pictures of which recording trained a model, so that nobody takes them for tests."""
 
 import hashlib
-import os
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import to_bytes
+from ico3d.common.files import resolved
 from ico3d.errors import CaptureError
 
 
@@ -25,7 +25,7 @@ def trained_on(capture: Capture, cameras: Iterable[int], frames: Sequence[int]) 
         of first and last frame of each run).
     """
     return {
-        "path": os.path.realpath(capture.path),
+        "path": str(resolved(capture.path)),
         "fingerprint": fingerprint(capture),
         "cameras": [capture.cameras[camera].name for camera in cameras],
         "frames": _runs(frames),
@@ -68,7 +68,7 @@ def check_told(summary: object) -> None:
 
 def is_same_recording(record: dict, capture: Capture) -> bool:
     """Whether a record of `trained_on` tells of this recording."""
-    if record.get("path") == os.path.realpath(capture.path):
+    if record.get("path") == str(resolved(capture.path)):
         return True
     return "fingerprint" in record and record["fingerprint"] == fingerprint(capture)
 

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 from asyncio import FIRST_COMPLETED
+from itertools import count
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
@@ -39,6 +40,7 @@ from ico3d.errors import Ico3dError, ProtocolError
 HELLO_SECONDS = 10  # that a page may take to say hello
 GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
 GONE = (1000, 1001)  # what pages send that will not come back: the visitor left, or loads it anew
+TURN = 32  # messages of a page after which others have their turn
 REFRESH = 15.0  # s after which a waiting page is told a new estimate
 
 
@@ -190,8 +192,10 @@ class Connection:
 
     async def _read(self, session: Session) -> None:
         binary = 0
-        while True:
+        for number in count(1):
             frame = await self._receive()
+            if number % TURN == 0:  # what came at once is there without a pause
+                await asyncio.sleep(0)
             if isinstance(frame, bytes):
                 binary += 1
                 self._outbox.put(Ack(binary))

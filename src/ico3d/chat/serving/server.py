@@ -27,6 +27,7 @@ from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.missing import tell_missing
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.network.handshakes import behind_tls
+from ico3d.chat.serving.network.lookups import new_loop
 from ico3d.chat.serving.network.prompt import PromptProtocol, allow_many_connections
 from ico3d.chat.serving.network.reach import as_seen
 from ico3d.chat.serving.network.websocket import BoundedWebSocket
@@ -218,6 +219,7 @@ def make_server(
     allow_many_connections()
     config = uvicorn.Config(
         app,
+        loop=f"{new_loop.__module__}:{new_loop.__name__}",
         log_config=None,  # `operator_log` takes what it says
         log_level="warning",
         ws=BoundedWebSocket,

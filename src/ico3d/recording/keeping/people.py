@@ -8,8 +8,12 @@ import re
 import secrets
 import shutil
 import stat
+import threading
 import unicodedata
+from collections.abc import Callable
+from concurrent.futures import Future
 from datetime import date
+from functools import partial
 from pathlib import Path
 
 from ico3d.avatar.forgetting.removal import remove
@@ -37,6 +41,8 @@ GONE = re.compile(r"\..+\.[0-9a-f]{16}\.gone")
 """Names of folders that are being removed."""
 MOST, MOST_ENTRIES = 100, 1000
 """Number of people whose recordings one folder holds, and of what is looked at there."""
+PATIENCE = 1.0
+"""Seconds that somebody waits for a removal."""
 SPARE = 200_000_000
 """Bytes that stay free on the disk."""
 
@@ -46,7 +52,7 @@ class People:
 
     def __init__(self, folder: Path):
         """Keeps them below `folder`, which is made where it is missing."""
-        self.folder = folder
+        self.folder, self._turn = folder, threading.Lock()
         folder.mkdir(parents=True, exist_ok=True)
 
     def names(self) -> list[str]:
@@ -131,14 +137,14 @@ class People:
             Refused: If there is nobody of this name.
             SettingsError: If something cannot be removed; the sentence names it.
         """
-        remove(self.set_aside(self.person(name).folder))
+        self.remove(self.set_aside(self.person(name).folder))
 
     def set_aside(self, path: Path) -> list[Path]:
         """Hides a file or folder of somebody, however large, at once: nobody writes there again.
 
         Returns:
-            What is to be removed, as `clear` does at the next start if nobody does so before;
-            nothing where there is none.
+            What `remove` is to be given, or `clear` removes at the next start; nothing where there
+            is none.
 
         Raises:
             SettingsError: If it cannot be renamed.
@@ -155,13 +161,47 @@ class People:
             raise SettingsError(f"{path} cannot be removed ({error.strerror}).") from error
         return [gone]
 
+    def remove(self, gone: list[Path]) -> None:
+        """Removes what was set aside, of one person after another.
+
+        Raises:
+            SettingsError: If something cannot be removed, and that is known within `PATIENCE`.
+        """
+        if gone:
+            self.beside(partial(self._remove, gone))
+
+    def _remove(self, gone: list[Path]) -> None:
+        with self._turn:
+            remove(gone)
+
+    def beside(self, act: Callable[[], None]) -> None:
+        """Does what takes as long as somebody's folder has files.
+
+        It is waited for, but no longer than `PATIENCE`: then it goes on by itself, and the log says
+        if it fails. Requests have few threads.
+
+        Args:
+            act: What is done; its error is raised as long as it is waited for.
+        """
+        end: Future[None] = Future()
+
+        def run() -> None:
+            try:
+                act()
+                end.set_result(None)
+            except Exception as error:  # whatever a stranger's folder does
+                log.warning("What somebody wanted removed: %s", error)
+                end.set_exception(error)
+
+        threading.Thread(target=run, daemon=True).start()
+        with contextlib.suppress(TimeoutError):
+            end.result(PATIENCE)
+
     def clear(self) -> None:
         """Removes what is left of removals that were killed; what cannot be removed is logged."""
-        left = [path for path in self.folder.iterdir() if GONE.fullmatch(path.name)]
-        try:
-            remove(left)
-        except SettingsError as error:
-            log.warning("%s", error)
+        names = (entry.name for entry in first_entries(self.folder, MOST_ENTRIES))
+        with contextlib.suppress(SettingsError):
+            self.remove([self.folder / name for name in names if GONE.fullmatch(name)])
 
 
 def is_name(text: str) -> bool:

@@ -3,6 +3,7 @@
 import fnmatch
 import json
 import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,7 +120,7 @@ class Person:
             OSError: If they cannot be written.
         """
         file = self._take(id, take)
-        size = file.stat().st_size if os.path.isfile(file) else 0
+        size = file.stat().st_size if os.path.lexists(file) else 0
         if offset + len(data) > (MOST_UPLOADED if id == UPLOAD else MOST_BYTES):
             raise Refused("large", "this is longer than is recorded: stop, and begin anew.", 413)
         if offset + len(data) <= size:
@@ -191,8 +192,8 @@ class Person:
         if not (take.isascii() and take.isalnum() and len(take) <= 32):
             raise Refused("part", "a take has a name of letters and digits.", 404)
         file = self._parts / f"{checked_id(id)}.{take}{UNFINISHED}"
-        if os.path.islink(file):
-            raise Refused("part", "a link to elsewhere is no take.", 404)
+        if os.path.lexists(file) and not stat.S_ISREG(file.lstat().st_mode):
+            raise Refused("part", "what is there is no take.", 404)
         return file
 
     def _takes(self, id: str) -> list[Path]:

@@ -8,10 +8,10 @@ import subprocess
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.packaged import NAME
 from ico3d.common.files import remove_unfinished
 from ico3d.creating.settings import QUALITIES, QualityName
@@ -195,11 +195,11 @@ class Makers:
             found = read_progress(places.folder)
             if found is not None and (id == CONSENT or found.is_of(id)):
                 self._stop(person)
-                remove_unfinished(places.folder)
-                gone += self._people.set_aside(places.work)
-                for file in (places.joined, places.joined_of, places.made):
-                    file.unlink(missing_ok=True)
-            person.remove(id)
+                for made in (places.work, places.joined, places.joined_of, places.made):
+                    gone += self._people.set_aside(made)
+        if gone:
+            self._people.beside(partial(remove_unfinished, places.folder))
+        self._people.beside(partial(person.remove, id))
 
     @contextlib.contextmanager
     def _clearing(self) -> Iterator[list[Path]]:
@@ -209,7 +209,7 @@ class Makers:
             with self._lock:
                 yield gone
         finally:
-            remove(gone)
+            self._people.remove(gone)
 
     def changed(self, person: Person, progress: Progress) -> list[str]:
         """What is another since a making began: `parts`, `on` (the body), both or nothing."""

@@ -1,5 +1,6 @@
 """How far an avatar is, in a file that the page is shown and that outlives every process."""
 
+import io
 import json
 import math
 import time
@@ -10,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from PIL import Image
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import read_small, write_atomic
 from ico3d.common.typed import plain
 from ico3d.creating.events import (
     STEPS,
@@ -30,6 +31,8 @@ from ico3d.recording.making.estimate import Estimate
 
 FILE, FACE = "progress.json", "face.jpg"
 State = Literal["running", "stopped", "failed", "made"]
+MOST_PICTURE, MOST_SIDE = 1 << 20, 4096
+"""Bytes of the picture of the face, and pixels of a side."""
 DEEPEST, MOST_FACES = 8, 10**6
 """How deep lists and objects lie in one another at most, and how many pictures a making shows."""
 OFTEN = 1.0
@@ -110,6 +113,19 @@ def read_progress(folder: Path) -> Progress | None:
             return None
         return replace(found, made_of=dict(found.made_of), **numbers, **lists)
     except (OSError, ValueError, TypeError, KeyError, OverflowError):
+        return None
+
+
+def shown_face(folder: Path) -> bytes | None:
+    """The picture of the face, a JPEG; None where there is none, or none of ours.
+
+    What lies there may be a stranger's, and a page decodes it whatever its size is.
+    """
+    try:
+        content = read_small(folder / FACE, links=False, most=MOST_PICTURE)
+        with Image.open(io.BytesIO(content), formats=("JPEG",)) as picture:
+            return content if max(picture.size) <= MOST_SIDE else None
+    except (OSError, ValueError, Image.DecompressionBombError):
         return None
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import tyro
 
+from ico3d.common.files import resolved
+
 if TYPE_CHECKING:
     from ico3d.training.listing.find_runs import Run
 
@@ -45,7 +47,7 @@ class Runs:
             for line in lines(run, time.time()):
                 console.print(printable(line))
         if not runs:
-            console.print(f"no trainings in {os.path.realpath(self.folder)} or below.")
+            console.print(f"no trainings in {resolved(self.folder)} or below.")
 
 
 def lines(run: "Run", now: float) -> list[str]:

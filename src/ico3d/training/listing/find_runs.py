@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from ico3d.common.files import read_object, walk
+from ico3d.common.files import read_object, resolved, walk
 from ico3d.errors import ModelError
 from ico3d.training.log import METRICS, is_step, latest_entry
 from ico3d.training.notes.lock import is_locked
@@ -201,7 +201,7 @@ def _judged(node: _Node) -> tuple[State, str]:
 
 def _command(node: _Node) -> str:
     """The command by which a run goes on, where it now is."""
-    state, now = node.state, os.path.realpath(node.path)
+    state, now = node.state, str(resolved(node.path))
     if not _is_training(state.command):  # whoever wrote the notes may want something else run
         return ""
     words = list(state.command)

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ico3d.common.files import read_object, write_atomic
+from ico3d.common.files import read_object, resolved, write_atomic
 from ico3d.errors import Ico3dError, StorageError
 from ico3d.training.log import is_step
 
@@ -71,7 +71,7 @@ def begun(folder: Path) -> None:
     told: dict[str, Any] = {"failed": None, "done": False}
     if command is not None:
         command.runs.append(folder)
-        told |= {"command": command.words, "folder": os.getcwd(), "path": os.path.realpath(folder)}
+        told |= {"command": command.words, "folder": os.getcwd(), "path": str(resolved(folder))}
     note(folder, **told)
 
 
