@@ -28,7 +28,7 @@ def own_names(kind):
     bases = [base for base in kind.__mro__ if base.__module__.startswith("pipecat.")]
     source = "\n".join(inspect.getsource(base) for base in bases)
     methods = {name for base in bases for name in vars(base) if re.match(r"_[a-z]", name)}
-    return methods | set(re.findall(r"self\.(_[a-z]\w*)(?:: [^=\n]+)? = ", source))
+    return methods | set(re.findall(r"self\.(__?[a-z]\w*)(?:: [^=\n]+)? = ", source))
 
 
 @pytest.mark.parametrize(("where", "name"), TOUCHED)

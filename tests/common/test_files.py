@@ -140,6 +140,25 @@ def test_a_folder_is_removed_however_deep_and_links_lead_nowhere(tmp_path, monke
     assert [path.name for path in tmp_path.iterdir()] == ["kept"] and (kept / "file").exists()
 
 
+def test_a_folder_that_may_not_be_written_is_moved_up(tmp_path, monkeypatch):
+    """Only who may write in a folder may move it to another one, unless they are root."""
+    folder = tmp_path / "gone"
+    deep = folder / "d" / "e"
+    deep.mkdir(parents=True)
+    (deep / "file").touch()
+    deep.chmod(0o555)
+    rename = os.rename
+
+    def strict(path, to):
+        if not os.stat(path).st_mode & 0o200:
+            raise PermissionError(13, "Permission denied", path)
+        rename(path, to)
+
+    monkeypatch.setattr(os, "rename", strict)
+    monkeypatch.setattr(files, "LONGEST", len(os.fsencode(deep)))
+    assert remove_folder(folder) is None and not folder.exists()
+
+
 def test_what_is_left_of_a_folder_is_told(tmp_path, monkeypatch):
     folder = tmp_path / "folder"
     (folder / "a").mkdir(parents=True)

@@ -36,6 +36,7 @@ from ico3d.chat.performing.face import Face
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.performing.remote_mouth import RemoteMouth
 from ico3d.chat.performing.wording import Wording
+from ico3d.chat.pipecat_internals import end_what_is_overtaken
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings.conversation import ChatSettings
@@ -297,7 +298,7 @@ class Conversation:
         user, assistant = aggregators(chosen, settings, parts.language, self._context)
         user.add_event_handler("on_user_turn_stopped", self._said)
         assistant.add_event_handler("on_assistant_turn_stopped", self._answered)
-        return Pipeline(
+        pipeline = Pipeline(
             [
                 self._input,
                 EchoFilter(self._echo),
@@ -321,6 +322,7 @@ class Conversation:
                 assistant,
             ]
         )
+        return end_what_is_overtaken(pipeline)
 
     def _body(self) -> Gestures | Cueing | None:
         """Who moves the body: by gestures on its skeleton, else as it was recorded."""

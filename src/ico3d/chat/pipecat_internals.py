@@ -7,11 +7,19 @@ version of pipecat lacks one; for that reason pyproject.toml allows only one min
 import asyncio
 import copy
 import functools
+import heapq
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from typing import Any, TypeVar
 
-from pipecat.frames.frames import Frame, VADUserStoppedSpeakingFrame
+from pipecat.frames.frames import (
+    Frame,
+    InterruptionFrame,
+    SystemFrame,
+    VADUserStoppedSpeakingFrame,
+)
+from pipecat.pipeline.pipeline import Pipeline
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessorQueue
 
 Function = TypeVar("Function", bound=Callable)
 
@@ -44,6 +52,7 @@ def touches(where: str, *names: str) -> Callable[[Function], Function]:
     return lambda function: function
 
 
+_PROCESSOR = "pipecat.processors.frame_processor:FrameProcessor"
 _LANGUAGE = "pipecat.services.llm_service:LLMService"
 _RECOGNITION = "pipecat.services.stt_service:STTService"
 _SEGMENTS = "pipecat.services.stt_service:SegmentedSTTService"
@@ -51,6 +60,33 @@ _VOICE = "pipecat.services.tts_service:TTSService"
 _AGGREGATOR = "pipecat.utils.text.simple_text_aggregator:SimpleTextAggregator"
 _TURN = "pipecat.audio.turn.smart_turn.base_smart_turn:BaseSmartTurn"
 _loading = threading.Lock()  # two sessions that begin at once load a model once
+
+
+class _InputQueue(FrameProcessorQueue):
+    """Frames that arrive at a processor, of which an interruption ends those that it overtakes.
+
+    Pipecat lets it overtake them, and ends only what was taken from here before: what arrived in
+    the same moment went on behind it, such as the answer to a question that a newer one replaced.
+    """
+
+    async def put(self, item: tuple[Frame, FrameDirection, Any]) -> None:
+        """Adds a frame."""
+        if isinstance(item[0], InterruptionFrame):
+            waiting, self._queue = self._queue, []
+            for entry in waiting:
+                if isinstance(entry[2][0], SystemFrame) or not entry[2][0].interruptible:
+                    heapq.heappush(self._queue, entry)
+                else:
+                    self.task_done()
+        await super().put(item)
+
+
+@touches(_PROCESSOR, "__input_queue")
+def end_what_is_overtaken(pipeline: Pipeline) -> Pipeline:
+    """Gives all processors of a pipeline that has not begun an `_InputQueue`."""
+    for processor in pipeline.processors:
+        setattr(processor, "_FrameProcessor__input_queue", _InputQueue())  # noqa: B010
+    return pipeline
 
 
 @touches(_LANGUAGE, "_push_llm_text")

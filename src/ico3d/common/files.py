@@ -246,9 +246,11 @@ def remove_folder(folder: Path) -> OSError | None:
         with _first(faults):
             if not stat.S_ISDIR(os.lstat(path).st_mode):
                 os.unlink(path)
-            elif len(os.fsencode(path)) < LONGEST:
+            elif len(trail) == 1 or len(os.fsencode(path)) < LONGEST:
                 trail.append((path, _names(path, faults)))
-            else:  # from where it is too deep it is moved up
+            else:  # from where it is too deep it is moved up, which only who may write there does
+                with suppress(OSError):
+                    os.chmod(path, stat.S_IRWXU)
                 higher = secrets.token_hex(8)
                 os.rename(path, os.path.join(folder, higher))
                 trail[0][1].append(higher)

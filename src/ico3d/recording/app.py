@@ -104,6 +104,7 @@ def make_app(room: Room, host: str, sites: Sites, names: tuple[str, ...] = ()) -
         yield
         await asyncio.to_thread(room.durations.close)
         await asyncio.to_thread(room.makers.close)
+        await asyncio.to_thread(room.people.close)
         await asyncio.to_thread(room.talks.close)
         await asyncio.to_thread(room.looks.close)
         room.eye.close()

@@ -66,3 +66,13 @@ def test_of_many_links_some_are_told(tmp_path, monkeypatch):
     assert len(told) == 3 and told[0].startswith("/elsewhere, to which ")
     assert told[-1] == "what further links led to"
     assert len(links_in([tmp_path / "0", tmp_path / "1"])) == 2
+
+
+def test_what_was_being_removed_is_known_by_its_name(tmp_path, capsys):
+    left = tmp_path / "people" / ".Ada.0123456789abcdef.gone"
+    (left / "parts").mkdir(parents=True)
+    (tmp_path / "people" / ".Ada.fedcba9876543210.gone").write_bytes(b"a film")
+    (tmp_path / "people" / ".Bob.0123456789abcdef.gone").mkdir()
+    assert forget(tmp_path) == 0
+    assert [path.name for path in (tmp_path / "people").iterdir()] == [".Bob.0123456789abcdef.gone"]
+    assert f"{left}: what is left of a removal of Ada" in capsys.readouterr().out

@@ -6,6 +6,7 @@ import itertools
 import json
 import socket
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -67,6 +68,18 @@ def remote(made, sound, between=None):
             between()
         rows.append(lips.push(floats(piece)))
     return np.concatenate([*rows, lips.finish()]), lips
+
+
+def test_a_name_server_that_is_silent_is_not_waited_for(model, sha256, sound, monkeypatch):
+    end = threading.Event()
+    monkeypatch.setattr(socket, "create_connection", lambda *_: end.wait(20))
+    made = mouth("http://module.example", model, sha256, SHORT)
+    begun = time.monotonic()
+    rows, lips = remote(made, sound)
+    made.close()
+    assert time.monotonic() - begun < 3 and lips._own is not None
+    np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+    end.set()
 
 
 async def test_the_remote_face_is_the_local_one(bundle, model, sha256, sound):

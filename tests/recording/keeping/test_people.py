@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -231,6 +232,32 @@ def test_a_name_that_was_spelled_elsewhere_is_found(tmp_path):
     assert people.person(name).consent()["language"] == "en"
     people.delete(name)
     assert people.names() == []
+
+
+def test_nobody_waits_for_the_removal_of_another_one(tmp_path, monkeypatch):
+    held, gone = threading.Event(), []
+
+    def slow(paths):
+        assert held.wait(20)
+        gone.extend(paths)
+
+    for name in ("Ada", "Ida", "Eve"):
+        begun(tmp_path, name)
+    people = People(tmp_path)
+    monkeypatch.setattr(room, "remove", slow)
+    monkeypatch.setattr(room, "PATIENCE", 0.2)
+    monkeypatch.setattr(room, "LAST", 0.1)
+    people.delete("Ada")
+    begin = time.monotonic()
+    people.delete("Ida")
+    people.delete("Eve")
+    assert time.monotonic() - begin < 0.15 and people.names() == []
+    people.close()
+    assert not gone
+    held.set()
+    monkeypatch.setattr(room, "LAST", 10)
+    people.close()  # an end waits for what is nearly done
+    assert {path.name.split(".")[1] for path in gone} == {"Ada", "Ida", "Eve"}
 
 
 def test_of_a_folder_of_thousands_some_are_looked_at(tmp_path, monkeypatch):

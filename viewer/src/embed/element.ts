@@ -41,6 +41,7 @@ export class AvatarElement extends HTMLElement {
   static server: string | null = null;
   private readonly shell: Shell;
   private server: Server | null = null;
+  private reached = ''; // its address
   private talk: Talk | null = null;
   private invitation: AbortController | null = null;
   private volume = 1;
@@ -64,7 +65,12 @@ export class AvatarElement extends HTMLElement {
 
   attributeChangedCallback(name: string, _: string | null, value: string | null): void {
     if (name === 'lang') this.shell.words.wish(value);
-    else if (this.server) this.server.token = value ?? '';
+    else queueMicrotask(() => this.renew());
+  }
+
+  /** Gives a new token to the server that it is for, once attributes that change together have changed. */
+  private renew(): void {
+    if (this.server && this.address()?.href === this.reached) this.server.token = this.getAttribute('token') ?? '';
   }
 
   /**
@@ -166,6 +172,7 @@ export class AvatarElement extends HTMLElement {
     const address = this.address();
     if (!address) throw new PageError(say('error.address'));
     this.server = new Server(address);
+    this.reached = address.href;
     this.server.token = this.getAttribute('token') ?? this.server.token;
     const tokens = this.getAttribute('token-url');
     if (tokens) await admit(this.server, fromSite(new URL(tokens, document.baseURI).href), say('error.token'), signal);

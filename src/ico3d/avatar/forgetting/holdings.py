@@ -1,10 +1,11 @@
 """What a project folder holds of people: recordings, models, runs, bundles, and whose they are."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ico3d.avatar.forgetting.removal import GONE
 from ico3d.avatar.models import KINDS
 from ico3d.bundle.archive import open_archive
 from ico3d.bundle.format import Bundle
@@ -79,6 +80,7 @@ def find_holdings(project: Path) -> list[Holding]:
 def _walk(project: Path) -> Iterator[Holding]:
     led_to: dict[str, Holding | None] = {}  # by real paths: a thousand links may lead to one place
     for folder, folders, files in walk(project):
+        yield from _removed(folder, [*folders, *files])
         folders[:] = sorted(n for n in folders if not n.startswith(".") or is_unfinished(n))
         if folder != project and (found := _folder(folder)) is not None:
             yield found
@@ -91,6 +93,13 @@ def _walk(project: Path) -> Iterator[Holding]:
         for file in (folder / name for name in sorted(files)):
             if (found := _file(file)) is not None:
                 yield found
+
+
+def _removed(folder: Path, names: Sequence[str]) -> Iterator[Holding]:
+    """What `ico3d studio` began to remove there, and was ended before all of it was gone."""
+    for name in sorted(names):
+        if (match := GONE.fullmatch(name)) is not None:
+            yield Holding(folder / name, "what is left of a removal", _named(match[1]))
 
 
 def _folder(folder: Path) -> Holding | None:

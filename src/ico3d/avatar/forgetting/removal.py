@@ -1,6 +1,7 @@
 """Removes files and folders, and says what that could not reach."""
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -12,6 +13,8 @@ from ico3d.rig.body_track import track_file as body_track_file
 from ico3d.training.listing.find_runs import ABOUT
 from ico3d.training.notes.lock import is_locked
 
+GONE = re.compile(r"\.(.+)\.[0-9a-f]{16}\.gone")
+"""Names of what is being removed of somebody, whose name is in it, as `ico3d studio` hides it."""
 MOST_TOLD = 100
 """Links of which it is said what they led to."""
 

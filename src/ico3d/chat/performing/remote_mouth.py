@@ -5,6 +5,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Future
+from urllib.parse import urlsplit
 
 import numpy as np
 from loguru import logger
@@ -129,8 +131,10 @@ class RemoteMouth:
     def _connected(self) -> ClientConnection:
         settings = self._settings
         key = key_for(settings.url, settings.key_variable, "chat settings: [expression]")
+        url = settings.url.replace("http", "ws", 1).rstrip("/") + PATH
         line = self._socket = connect(
-            settings.url.replace("http", "ws", 1).rstrip("/") + PATH,
+            url,
+            sock=_opened(url, settings.timeout),
             additional_headers={"Authorization": f"Bearer {key}"} if key else {},
             open_timeout=settings.timeout,
             close_timeout=settings.timeout,
@@ -152,6 +156,26 @@ class RemoteMouth:
         if line is not None:
             which = line, self._settings.timeout
             threading.Thread(target=_close, args=which, daemon=True).start()  # it may wait
+
+
+def _opened(url: str, seconds: float) -> socket.socket:
+    """A connection to a server, whose name is looked up in no more time than that either.
+
+    Raises:
+        OSError: If there is none.
+    """
+    parts = urlsplit(url)
+    port = parts.port or (443 if parts.scheme == "wss" else 80)
+    found: Future[socket.socket] = Future()
+
+    def open_it() -> None:
+        try:
+            found.set_result(socket.create_connection((parts.hostname, port), seconds))
+        except OSError as error:
+            found.set_exception(error)
+
+    threading.Thread(target=open_it, daemon=True).start()  # a silent name server takes 10 s
+    return found.result(seconds)
 
 
 @contextlib.contextmanager

@@ -4,11 +4,11 @@ import contextlib
 import json
 import logging
 import os
-import re
 import secrets
 import shutil
 import stat
 import threading
+import time
 import unicodedata
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -16,7 +16,7 @@ from datetime import date
 from functools import partial
 from pathlib import Path
 
-from ico3d.avatar.forgetting.removal import remove
+from ico3d.avatar.forgetting.removal import GONE, remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
 from ico3d.common.files import first_entries, write_atomic
 from ico3d.common.people.spelling import spelled
@@ -37,12 +37,10 @@ log = logging.getLogger(__name__)
 
 LONGEST_NAME = 40
 """Letters of the name of a person, and so of a folder and a file."""
-GONE = re.compile(r"\..+\.[0-9a-f]{16}\.gone")
-"""Names of folders that are being removed."""
 MOST, MOST_ENTRIES = 100, 1000
 """Number of people whose recordings one folder holds, and of what is looked at there."""
-PATIENCE = 1.0
-"""Seconds that somebody waits for a removal."""
+PATIENCE, LAST = 1.0, 5.0
+"""Seconds that somebody waits for a removal, and that the end of the server waits for all."""
 SPARE = 200_000_000
 """Bytes that stay free on the disk."""
 
@@ -53,6 +51,7 @@ class People:
     def __init__(self, folder: Path):
         """Keeps them below `folder`, which is made where it is missing."""
         self.folder, self._turn = folder, threading.Lock()
+        self._acts: list[threading.Thread] = []  # that go on beside
         folder.mkdir(parents=True, exist_ok=True)
 
     def names(self) -> list[str]:
@@ -149,7 +148,8 @@ class People:
         Raises:
             SettingsError: If it cannot be renamed.
         """
-        gone = self.folder / f".{path.name}.{secrets.token_hex(8)}.gone"
+        name = path.relative_to(self.folder).parts[0]
+        gone = self.folder / f".{name}.{secrets.token_hex(8)}.gone"
         try:
             if os.path.isdir(path) and not os.path.islink(path):
                 with contextlib.suppress(OSError):  # only who may write there may move it
@@ -165,23 +165,25 @@ class People:
         """Removes what was set aside, of one person after another.
 
         Raises:
-            SettingsError: If something cannot be removed, and that is known within `PATIENCE`.
+            SettingsError: If something cannot be removed, and that is known within `PATIENCE`;
+                nobody waits for another one's removal.
         """
         if gone:
-            self.beside(partial(self._remove, gone))
+            self.beside(partial(self._remove, gone), 0.0 if self._turn.locked() else PATIENCE)
 
     def _remove(self, gone: list[Path]) -> None:
         with self._turn:
             remove(gone)
 
-    def beside(self, act: Callable[[], None]) -> None:
+    def beside(self, act: Callable[[], None], patience: float = PATIENCE) -> None:
         """Does what takes as long as somebody's folder has files.
 
-        It is waited for, but no longer than `PATIENCE`: then it goes on by itself, and the log says
-        if it fails. Requests have few threads.
+        It is waited for, but not for long: then it goes on by itself, and the log says if it fails.
+        Requests have few threads.
 
         Args:
             act: What is done; its error is raised as long as it is waited for.
+            patience: Seconds for which it is.
         """
         end: Future[None] = Future()
 
@@ -193,9 +195,19 @@ class People:
                 log.warning("What somebody wanted removed: %s", error)
                 end.set_exception(error)
 
-        threading.Thread(target=run, daemon=True).start()
+        thread = threading.Thread(target=run, daemon=True)
+        self._acts = [one for one in self._acts if one.is_alive()] + [thread]
+        thread.start()
         with contextlib.suppress(TimeoutError):
-            end.result(PATIENCE)
+            end.result(patience)
+
+    def close(self) -> None:
+        """Waits a little for removals; `clear` ends at the next start those that take longer."""
+        end = time.monotonic() + LAST
+        for thread in self._acts:
+            thread.join(max(0.0, end - time.monotonic()))
+        if any(thread.is_alive() for thread in self._acts):
+            log.warning("What somebody wanted removed is not all gone: the next start goes on.")
 
     def clear(self) -> None:
         """Removes what is left of removals that were killed; what cannot be removed is logged."""

@@ -38,8 +38,9 @@ class Lookups:
     def _begun(self, question: tuple[Any, ...]) -> "asyncio.Future[list[Any]]":
         if sum(not answer.done() for answer in self._asked.values()) >= MOST:
             raise socket.gaierror(socket.EAI_AGAIN, "too many names are looked up just now")
-        answer = self._asked[question] = self._loop.create_future()
+        answer = self._loop.create_future()
         threading.Thread(target=self._look_up, args=(question, answer), daemon=True).start()
+        self._asked[question] = answer
         return answer
 
     def _look_up(self, question: tuple[Any, ...], answer: "asyncio.Future[list[Any]]") -> None:
@@ -81,6 +82,7 @@ class _LookingUp(asyncio.AbstractEventLoop):
         flags: int = 0,
     ) -> Any:
         """As of any loop; names are looked up by `Lookups`."""
+        host = host.decode("ascii") if isinstance(host, bytes) else host  # as anyio gives them
         if not _is_name(host):
             how = {"family": family, "type": type, "proto": proto, "flags": flags}
             return await super().getaddrinfo(host, port, **how)
