@@ -1,5 +1,6 @@
 """What is used of pipecat beyond its documented interface is in one module, and still there."""
 
+import asyncio
 import importlib
 import inspect
 import pkgutil
@@ -7,9 +8,18 @@ import re
 from functools import cache
 
 import pytest
+from pipecat.frames.frames import (
+    EndFrame,
+    InterruptionFrame,
+    LLMRunFrame,
+    TextFrame,
+    UserStartedSpeakingFrame,
+)
+from pipecat.pipeline.pipeline import Pipeline
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 import ico3d.chat
-from ico3d.chat.pipecat_internals import OVERRIDDEN, TOUCHED
+from ico3d.chat.pipecat_internals import OVERRIDDEN, TOUCHED, end_what_is_overtaken
 
 pytestmark = pytest.mark.slow
 
@@ -63,3 +73,17 @@ def test_nothing_else_is_touched():
 
 def own_bases(kind):
     return [base for base in kind.__mro__ if base.__module__.startswith("pipecat.")]
+
+
+async def test_an_interruption_ends_what_it_overtakes():
+    processor = FrameProcessor()
+    end_what_is_overtaken(Pipeline([processor]))
+    queue = processor._FrameProcessor__input_queue
+    before = [LLMRunFrame(), TextFrame("a"), EndFrame(), UserStartedSpeakingFrame()]
+    for frame in (*before, InterruptionFrame(), TextFrame("b")):
+        await queue.put((frame, FrameDirection.DOWNSTREAM, None))
+    kinds = [type((await queue.get())[0]) for _ in range(queue.qsize())]
+    assert kinds == [UserStartedSpeakingFrame, InterruptionFrame, EndFrame, TextFrame]
+    for _ in kinds:
+        queue.task_done()
+    await asyncio.wait_for(queue.join(), 1)
