@@ -22,7 +22,7 @@ test('what stands in a folder that somebody brought is laid out at once', async 
 });
 
 test('a refusal is told, whatever its body is', async () => {
-  answers('{"code": "full", "error": "no room"}', 507);
+  answers('{"error": "no room"}', 507);
   await expect(recordings.status('Ada')).rejects.toMatchObject({ status: 507, message: 'no room' });
   answers('Internal Server Error', 500);
   const refused: unknown = await recordings.status('Ada').catch((error: unknown) => error);

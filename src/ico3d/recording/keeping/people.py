@@ -50,7 +50,7 @@ class People:
 
     def __init__(self, folder: Path):
         """Keeps them below `folder`, which is made where it is missing."""
-        self.folder, self._turn = folder, threading.Lock()
+        self.folder, self._turn, self._listed = folder, threading.Lock(), threading.Lock()
         self._acts: list[threading.Thread] = []  # that go on beside
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -196,8 +196,9 @@ class People:
                 end.set_exception(error)
 
         thread = threading.Thread(target=run, daemon=True)
-        self._acts = [one for one in self._acts if one.is_alive()] + [thread]
         thread.start()
+        with self._listed:
+            self._acts = [one for one in self._acts if one.is_alive()] + [thread]
         with contextlib.suppress(TimeoutError):
             end.result(patience)
 
