@@ -224,6 +224,7 @@ async def test_our_pipeline_talks_with_transformers_serve(bundle, served_model):
     settings = ChatSettings(BROWSER, Choice("openai", {"url": url, "model": model}))
     async with serving(bundle, settings) as (page_url, _):
         page, _ = await open_page(page_url, microphone=False)
+        await page.wait(End)  # the greeting's, whose place a question at once would take
         for utterance in (1, 2):
             await page.send(Text("who are you?"))
             await page.wait(End, where=lambda m, n=utterance: m.utterance == n)
