@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.avatar.baked_body import SkinnedBody
+from ico3d.avatar.embodying.surfaces import main_joints
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.avatar.staging import thumbnail
 from ico3d.bundle.animation import ANIMATION, Rest
@@ -104,11 +105,10 @@ def write_person(
 
 def evened(body: BakedSkinned) -> BakedSkinned:
     """The body whose trousers are as plain between the legs as beside, in every pose."""
-    strongest = body.joints[np.arange(len(body.joints)), body.weights.argmax(1)]
     legs = ("upperleg", "pelvis", "spine05")
     hips = body.rig.joints[body.rig.names.index("upperleg01.L"), 1]
     aside, under = np.abs(body.means[:, 0]), hips - body.means[:, 1]  # (N,), (N,)
-    trousers = np.array([name.startswith(legs) for name in body.rig.names])[strongest]
+    trousers = _hang_on(body, legs)
     front = trousers & (body.means[:, 2] > 0) & (under > BELOW[0])
     beside = front & (aside > SEAM) & (aside < BESIDE) & (under < BELOW[2])
     logits = body.color_logits.astype(np.float64)
@@ -207,10 +207,14 @@ def muted(body: BakedSkinned) -> BakedSkinned:
     Few pictures show skin in the shade of cuffs and collar, and what they show is red with the
     light that went through skin: seen from elsewhere it was a glowing ring.
     """
-    strongest = body.joints[np.arange(len(body.joints)), body.weights.argmax(1)]
-    bare = np.array([name.startswith(BARE) for name in body.rig.names])[strongest]  # (N,)
+    bare = _hang_on(body, BARE)
     logits = body.color_logits.astype(np.float64)
     excess = np.maximum(logits[:, :1] - logits[:, 1:] - REDDEST, 0) * bare[:, None]  # (N, 2)
     logits[:, 1:] += 0.7 * excess
     logits[:, 0] -= 0.3 * excess.max(1)
     return replace(body, color_logits=logits.astype(np.float16))
+
+
+def _hang_on(body: BakedSkinned, beginnings: tuple[str, ...]) -> np.ndarray:
+    """(N,) bool: which Gaussians are carried most by joints whose names begin so."""
+    return np.array([name.startswith(beginnings) for name in body.rig.names])[main_joints(body)]

@@ -110,10 +110,10 @@ class BakedHead:
 
     def preceded(self, more: Mapping[str, np.ndarray]) -> "BakedHead":
         """The head after further Gaussians, whose tensors are given by name in any type."""
+        own = self._tensors
         parts = {
-            name: np.concatenate([more[name].astype(tensor.dtype), tensor], axis)
+            name: np.concatenate([more[name].astype(own[name].dtype), own[name]], axis)
             for name, axis in _AXES.items()
-            for tensor in (self._tensors[name],)
         }
         return replace(self, **parts)
 

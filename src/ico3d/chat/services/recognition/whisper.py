@@ -106,7 +106,7 @@ def find(settings: Settings) -> Path:
         MissingModelError: If no such model is installed; the sentence says how to get one.
         SettingsError: If the name is unknown.
     """
-    if settings.model not in NAMES and os.path.isdir(Path(settings.model)):
+    if settings.model not in NAMES and os.path.isdir(settings.model):
         return complete(Path(settings.model))
     names = candidates(settings)
     for name in names:
