@@ -50,6 +50,23 @@ def test_a_part_whose_page_was_closed_is_there_and_can_be_kept(person):
     ]
 
 
+@pytest.mark.parametrize("listed", [False, True])
+def test_a_part_is_there_while_it_is_being_kept(person, monkeypatch, listed):
+    """The page asks for all parts again and again, between any two steps of who keeps one."""
+    person.append("text-1", "a1", 0, WEBM)
+    files, report = person._files, {"seconds": 2.0, "turn": None, "advice": []}
+
+    def meanwhile(pattern):
+        before = list(files(pattern))
+        monkeypatch.setattr(person, "_files", files)
+        person.keep("text-1", "a1", report)
+        return before if listed else []
+
+    monkeypatch.setattr(person, "_files", meanwhile)
+    part = person.part("text-1")
+    assert (part.file.name, part.report) == ("text-1.webm", report)
+
+
 def test_an_earlier_take_stays_until_the_new_one_is_kept(person):
     kept(person, "left", WEBM + b"first")
     person.append("left", "b2", 0, MP4)

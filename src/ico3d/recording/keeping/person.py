@@ -1,10 +1,11 @@
 """What is recorded of one person: parts that grow while they are recorded, and the kept ones."""
 
+import contextlib
 import fnmatch
 import json
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,14 +95,8 @@ class Person:
 
     def part(self, id: str) -> Part | None:
         """One part; None where nothing of it was recorded."""
-        kept = self._kept(checked_id(id))
-        if kept is not None:
-            return Part(id, kept, "", self._report(id))
-        takes = self._takes(id)
-        if not takes:
-            return None
-        largest = max(takes, key=lambda file: file.stat().st_size)
-        return Part(id, largest, largest.name.split(".")[1], None)
+        checked_id(id)
+        return self._found(id) or self._found(id)  # a listing may miss what is renamed meanwhile
 
     def append(self, id: str, take: str, offset: int, data: bytes) -> int:
         """Adds bytes to a take; those that it has already are taken as repeated.
@@ -196,13 +191,24 @@ class Person:
             raise Refused("part", "what is there is no take.", 404)
         return file
 
+    def _found(self, id: str) -> Part | None:
+        """A part as one listing shows it, the kept one before takes of a new one."""
+        files = list(self._files(f"{id}.*"))
+        kept, takes = _kept_of(files), with_stat(f for f in files if f.suffix == UNFINISHED)
+        if kept is not None:
+            return Part(id, kept, "", self._report(id))
+        if not takes:
+            return None
+        largest, _ = max(takes, key=lambda take: take[1].st_size)
+        return Part(id, largest, largest.name.split(".")[1], None)
+
     def _takes(self, id: str) -> list[Path]:
         """Unfinished takes of a part, the oldest first."""
-        return sorted(self._files(f"{id}.*{UNFINISHED}"), key=lambda file: file.stat().st_mtime)
+        takes = with_stat(self._files(f"{id}.*{UNFINISHED}"))
+        return [file for file, _ in sorted(takes, key=lambda take: take[1].st_mtime)]
 
     def _kept(self, id: str) -> Path | None:
-        files = self._files(f"{id}.*")
-        return next((f for f in files if f.suffix not in (UNFINISHED, ".json")), None)
+        return _kept_of(self._files(f"{id}.*"))
 
     def _files(self, pattern: str) -> Iterator[Path]:
         """Files of the parts; what a link leads to may be anything of this machine."""
@@ -232,3 +238,17 @@ def checked_id(id: str) -> str:
     if id not in ALL_IDS:
         raise Refused("part", "there is no such part of a recording.", 404)
     return id
+
+
+def _kept_of(files: Iterable[Path]) -> Path | None:
+    """The recording among the files of a part."""
+    return next((file for file in files if file.suffix not in (UNFINISHED, ".json")), None)
+
+
+def with_stat(files: Iterable[Path]) -> list[tuple[Path, os.stat_result]]:
+    """Files with what the system says of them, but those that are gone meanwhile."""
+    found = []
+    for file in files:
+        with contextlib.suppress(FileNotFoundError):
+            found.append((file, file.stat()))
+    return found

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from ico3d.recording.keeping.person import Person
+from ico3d.recording.keeping.person import Person, with_stat
 from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
 
 
@@ -23,4 +23,4 @@ def recorded_seconds(person: Person) -> float:
 
 def signature(files: Sequence[Path]) -> list[list]:
     """What tells these files from others, and from other takes under the same names."""
-    return [[file.name, file.stat().st_size, file.stat().st_mtime] for file in files]
+    return [[file.name, told.st_size, told.st_mtime] for file, told in with_stat(files)]
