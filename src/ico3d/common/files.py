@@ -1,6 +1,7 @@
 """Writes files so that a crash never leaves half of one; finds and reads small ones of anybody."""
 
 import errno
+import fcntl
 import itertools
 import os
 import re
@@ -219,6 +220,31 @@ def first_entries(folder: Path, most: int) -> list[os.DirEntry[str]]:
             return list(itertools.islice(entries, most))
     except OSError:
         return []
+
+
+def locked_folder(folder: Path) -> int | None:
+    """An open folder that this process alone has locked, until it is closed or the process ends.
+
+    Where a file system knows no locks, nothing is locked.
+
+    Args:
+        folder: No link.
+
+    Returns:
+        A descriptor; None where another process holds it, or there is no such folder.
+    """
+    try:
+        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        return None
+    except OSError:
+        pass
+    return lock
 
 
 def remove_folder(folder: Path) -> OSError | None:

@@ -35,6 +35,7 @@ from ico3d.recording.making.durations import Durations
 from ico3d.recording.making.makers import PACKAGED, Bodies, Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import shown_face
+from ico3d.recording.making.sources import Recorded
 from ico3d.recording.making.talks import Talks
 from ico3d.recording.presence import CLIENT_GONE, while_there
 from ico3d.recording.refusals import Refused, full_disk
@@ -227,8 +228,8 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         found = await asyncio.to_thread(room.people.person(name).part, id)
         if found is None:
             raise Refused("part", "this part is not recorded.", 404)
-        kind = TYPES.get(found.file.suffix, "video/webm")
-        return FileResponse(found.file, media_type=kind, headers=NEVER_KEPT)
+        kind, about = TYPES.get(found.file.suffix, "video/webm"), os.stat(found.file)
+        return FileResponse(found.file, media_type=kind, headers=NEVER_KEPT, stat_result=about)
 
     @app.delete(part)
     async def remove(name: str, id: str) -> Response:
@@ -300,9 +301,9 @@ def _add_making(app: FastAPI, room: Room) -> None:
 
 def _status(room: Room, person: Person) -> dict[str, Any]:
     """All that the page shows of a person."""
-    about = person.consent()
-    language = about["language"]
-    script, found = scripts()[language], {part.id: part for part in person.parts()}
+    about, recorded = person.consent(), Recorded.of(person)
+    language, found = recorded.language, recorded.parts
+    script = scripts()[language]
     texts = {f"text-{n}": one.text for n, one in enumerate(script.texts, 1)}
     texts[CONSENT] = script.consent.format(name=person.name)
     if VOICE_CONSENT in about:
@@ -316,14 +317,14 @@ def _status(room: Room, person: Person) -> dict[str, Any]:
         "language": language,
         "parts": parts,
         "covered": plain(covered(found.values(), language)),
-        "making": _of_making(room, person),
-        "durations": dict(room.durations.of(person)),
+        "making": _of_making(room, person, recorded),
+        "durations": dict(room.durations.of(recorded)),
         "body": as_form(room.bodies.choice(person)),
         "avatar": os.path.isfile(Places(person.folder).avatar),
     }
 
 
-def _of_making(room: Room, person: Person) -> dict[str, Any] | None:
+def _of_making(room: Room, person: Person, recorded: Recorded) -> dict[str, Any] | None:
     """What the page shows of a making, with what has changed since it began."""
     progress = room.makers.progress(person)
     if progress is None:
@@ -331,7 +332,7 @@ def _of_making(room: Room, person: Person) -> dict[str, Any] | None:
     shown = plain(progress) | {"left": progress.left_at(time.time())}
     for name in ("made_of", "later", "told"):
         del shown[name]
-    return shown | {"changed": room.makers.changed(person, progress)}
+    return shown | {"changed": room.makers.changed(person, progress, recorded)}
 
 
 def _of_part(part: Any) -> dict[str, Any]:

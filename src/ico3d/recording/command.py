@@ -57,7 +57,8 @@ class Studio:
         Raises:
             BundleError: If the body cannot be used.
             SettingsError: If others could come without HTTPS, the port is taken, the folder cannot
-                be made, or heads alone are to have a build or an outfit.
+                be made or another studio serves it, or heads alone are to have a build or an
+                outfit.
         """
         from ico3d.chat.observing.operator_log import set_up_log
 
@@ -69,6 +70,7 @@ class Studio:
         from ico3d.chat.serving.network.reach import find_reach, fragment
         from ico3d.chat.serving.sites import open_sites, shown_key
         from ico3d.chat.settings.embedding import Embedding
+        from ico3d.common.files import locked_folder, resolved
         from ico3d.creating.voice.clone import hindrance
         from ico3d.errors import SettingsError
         from ico3d.recording.app import make_app, open_room
@@ -90,6 +92,11 @@ class Studio:
         os.umask(OWN)
         listener = server.bind(self.host, self.port)
         try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if locked_folder(resolved(self.folder)) is None:  # held until this process ends
+                raise SettingsError(
+                    f"{self.folder} is served by another ico3d studio: use its page, or end it."
+                )
             where = (self.folder.absolute(), self.host, self.tls)
             bodies = Bodies(self.body or Path(NAME), BodyChoice(self.body is not None, look))
             room = open_room(*where, bodies, self.voice)

@@ -4,12 +4,14 @@ import asyncio
 import contextlib
 import gzip
 import itertools
+import json
 import threading
 import time
 from datetime import UTC, datetime
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+import httpx
 import pytest
 from websockets.asyncio.server import serve
 
@@ -192,6 +194,53 @@ def test_odd_cookies_are_no_obstacle():
             client = fetching.Client(other, cookies=client.cookies)
             fetching.fetch(client, "/ws")
         assert client.cookies_for("/ws") == kept
+
+
+@pytest.mark.parametrize("to", ["http://xn--a/", "javascript:x", "http://[bad", "http://a:99999/"])
+async def test_an_address_that_is_none_is_a_finding(to):
+    with answering({"Location": to}, []) as url, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(BaseHTTPRequestHandler, "send_response", _redirecting)
+        found = await looked_at(url)
+    assert found[-1].grade == "bad"
+
+
+_respond = BaseHTTPRequestHandler.send_response
+
+
+def _redirecting(handler, code):
+    _respond(handler, 302)
+
+
+@pytest.mark.parametrize("token", ["\ud800", "a b", "a\r\nHost: other", "t" * 5000, "", None, 7])
+def test_a_token_that_no_address_can_hold_is_none(token):
+    given = fetching.Answer(200, httpx.Headers(), json.dumps({"token": token}).encode())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(deployment, "fetch", lambda *_, **__: given)
+        assert deployment.token_for(fetching.Client("http://127.0.0.1:1"), "key") is None
+
+
+async def test_no_server_sends_this_machine_elsewhere():
+    """What only this machine reaches was asked in its name."""
+    asked = []
+
+    def elsewhere(wire, request):
+        asked.append(request.path)
+
+    async def silent(wire):
+        await wire.wait_closed()
+
+    async with serve(silent, "127.0.0.1", 0, process_request=elsewhere) as other:
+        there = f"ws://127.0.0.1:{other.sockets[0].getsockname()[1]}/internal"
+
+        def redirected(wire, request):
+            answer = wire.respond(302, "")
+            answer.headers["Location"] = there
+            return answer
+
+        async with serve(silent, "127.0.0.1", 0, process_request=redirected) as server:
+            url = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+            (found,) = await visit.Visitor(url, None, "").findings()
+    assert found.what.startswith("no WebSocket can be opened (server rejected") and not asked
 
 
 async def test_what_breaks_off_is_a_finding():

@@ -209,3 +209,13 @@ async def test_a_page_that_was_built_without_them_is_served_plain(tmp_path, monk
     answer, body = await raw(client(tmp_path, monkeypatch), "", Accept_Encoding="br, gzip")
     assert (answer.status_code, body) == (200, TEXTS["index.html"])
     assert "content-encoding" not in answer.headers
+
+
+async def test_no_file_is_an_answer_to_a_websocket(folder):
+    sent = []
+
+    async def send(message):
+        sent.append(message["type"])
+
+    await PageFiles(folder)({"type": "websocket", "path": "/assets/x"}, None, send)
+    assert sent == ["websocket.close"]

@@ -63,7 +63,10 @@ async def test_only_a_ping_is_answered():
     sent.append(message(asked[-1], number=104))
     sent.insert(2, message("notifications/tools/list_changed", number=None))
     server = Scripted(sent)
-    async with asked_nothing(server.open()) as streams, ClientSession(*streams) as session:
+    async with (
+        asked_nothing(server.open(), "tools.mcp.clock") as streams,
+        ClientSession(*streams) as session,
+    ):
         await session.initialize()
         with anyio.fail_after(30):
             while not any(getattr(one, "id", None) for one in server.answers):
@@ -90,7 +93,7 @@ async def received(*messages):
         there.close()
         yield reading, None
 
-    async with asked_nothing(transport()) as (reading, _):
+    async with asked_nothing(transport(), "tools.mcp.clock") as (reading, _):
         return [item.message async for item in reading]
 
 
@@ -132,6 +135,29 @@ async def test_other_answers_come_through_as_they_are():
     tools = {"tools": [{"name": "now", "inputSchema": {"type": "object"}}]}
     (told,) = await received(answered(tools))
     assert told.result == tools
+
+
+async def test_of_a_list_of_functions_comes_through_what_is_used():
+    """The SDK keeps what pages say of answers, and asks for many of them at a refused call."""
+    about = {"name": "now", "description": "The time.", "inputSchema": {"type": "object"}}
+    rest = {"outputSchema": {"a": "x" * 1000}, "icons": [{}] * 100, "_meta": {}, "title": "Now"}
+    page = {"nextCursor": "2", "ttlMs": 5, "cacheScope": "private", "resultType": "complete"}
+    (told,) = await received(answered({"tools": [about | rest, about], "_meta": {}, **page}))
+    del page["nextCursor"]
+    assert told.result == {"tools": [about, about], **page}
+
+
+@pytest.mark.parametrize(
+    ("long", "headers", "comes"),
+    [(256, 64, True), (257, 1, False), (1, 65, False), (1000, 0, True)],
+)
+async def test_a_function_with_many_headers_or_long_names_is_left_out(long, headers, comes):
+    """Names of 900,000 letters above 2,600 headers took 2.5 GB and 6 s of all others."""
+    leaves = {f"p{n}": {"type": "string", "x-mcp-header": f"h{n}"} for n in range(headers)}
+    schema = {"type": "object", "properties": {"x" * long: {"properties": leaves}}}
+    tools = [{"name": "odd", "inputSchema": schema}, {"name": "now", "inputSchema": {}}]
+    (told,) = await received(answered({"tools": tools}))
+    assert [tool["name"] for tool in told.result["tools"]] == ["odd"] * comes + ["now"]
 
 
 def test_what_breaks_the_protocol_is_said_in_a_few_words():

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -50,20 +51,21 @@ def test_a_part_whose_page_was_closed_is_there_and_can_be_kept(person):
     ]
 
 
-@pytest.mark.parametrize("listed", [False, True])
-def test_a_part_is_there_while_it_is_being_kept(person, monkeypatch, listed):
+@pytest.mark.parametrize("way", ["listed before", "listed never"])
+@pytest.mark.parametrize("asked", ["alone", "with all"])
+def test_a_part_is_there_while_it_is_being_kept(person, monkeypatch, way, asked):
     """The page asks for all parts again and again, between any two steps of who keeps one."""
     person.append("text-1", "a1", 0, WEBM)
-    files, report = person._files, {"seconds": 2.0, "turn": None, "advice": []}
+    listing, report = room.first_entries, {"seconds": 2.0, "turn": None, "advice": []}
 
-    def meanwhile(pattern):
-        before = list(files(pattern))
-        monkeypatch.setattr(person, "_files", files)
+    def meanwhile(*words):
+        before = listing(*words)
+        monkeypatch.setattr(room, "first_entries", listing)
         person.keep("text-1", "a1", report)
-        return before if listed else []
+        return before if way == "listed before" else []
 
-    monkeypatch.setattr(person, "_files", meanwhile)
-    part = person.part("text-1")
+    monkeypatch.setattr(room, "first_entries", meanwhile)
+    part = person.part("text-1") if asked == "alone" else next(person.parts())
     assert (part.file.name, part.report) == ("text-1.webm", report)
 
 
@@ -206,14 +208,48 @@ def test_what_lies_elsewhere_is_not_read(person):
 
 
 def test_thousands_of_files_are_not_looked_through(person, monkeypatch):
-    monkeypatch.setattr(room, "MOST_FILES", 50)
-    (person.folder / room.PARTS).mkdir()
+    """A page asks for all parts again and again: a stranger's folder held up those of others."""
+    kept(person, "left", WEBM)
     for number in range(200):
+        (person.folder / room.PARTS / f"right.{number}.part").touch()
+    monkeypatch.setattr(room, "MOST_FILES", 50)
+    listed, looked = [], []
+    listing, look = room.first_entries, Path.lstat
+    monkeypatch.setattr(room, "first_entries", lambda *a: listed.append(listing(*a)) or listed[-1])
+    monkeypatch.setattr(Path, "lstat", lambda file: looked.append(file) or look(file))
+    assert {part.id for part in person.parts()} >= {"left"}
+    assert [len(entries) for entries in listed] == [50]
+    assert len(looked) <= len(room.SUFFIXES) * len(room.ALL_IDS)
+
+
+def test_a_crowd_hides_no_part_that_was_kept(person, monkeypatch):
+    monkeypatch.setattr(room, "MOST_FILES", 5)
+    (person.folder / room.PARTS).mkdir()
+    for number in range(50):
         (person.folder / room.PARTS / f"x{number}").touch()
-    matched = []
-    real = room.fnmatch.fnmatchcase
-    monkeypatch.setattr(room.fnmatch, "fnmatchcase", lambda *a: matched.append(1) or real(*a))
-    person.part("left")
-    assert 0 < len(matched) <= 2 * 50  # kept ones, then takes
-    (person.folder / room.PARTS / "left.folder").mkdir()
-    person.remove("left")
+    kept(person, "consent", WEBM)
+    assert [part.id for part in person.parts()] == ["consent"]
+    person.check_spoken()
+
+
+def test_of_a_part_all_files_go_and_nothing_that_was_recorded_anew(person, monkeypatch):
+    parts = person.folder / room.PARTS
+    kept(person, "left", WEBM)
+    kept(person, "right", WEBM)
+    for number in range(20):
+        (parts / f"left.{number}.part").touch()
+    (parts / "left.folder").mkdir()
+    (parts / "left.mp4.link").symlink_to(parts / "right.webm")
+    assert person.remove("left") is False  # all of it was looked at
+    assert {file.name for file in parts.iterdir()} == {"right.webm", "right.json", "left.folder"}
+    for number in range(20):
+        (parts / f"left.{number}.part").touch()
+    monkeypatch.setattr(room, "MOST_FILES", 5)
+    assert person.remove("left") is True
+    until = max(file.stat().st_ctime for file in parts.iterdir())
+    while time.time() <= until + 0.01:  # a clock tick of the file system
+        time.sleep(0.01)
+    kept(person, "left", WEBM)
+    person.remove_rest("left", until)
+    left = {"left.webm", "left.json"}
+    assert {file.name for file in parts.glob("left.*")} == left | {"left.folder"}

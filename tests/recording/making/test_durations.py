@@ -9,6 +9,7 @@ import pytest
 from ico3d.creating.settings import QUALITIES
 from ico3d.recording.making import durations as room
 from ico3d.recording.making.durations import Durations
+from ico3d.recording.making.sources import Recorded
 from support.studio_page.parts import begun, kept
 
 MODULE = "support.studio_page.pretended_pace"
@@ -40,17 +41,17 @@ def test_each_quality_has_its_time_once_something_is_recorded(person, said):
     said("seconds of a step: 0.02")
     durations = Durations(lambda: False, MODULE)
     kept(person, "text-1", WEBM, seconds=40.0)
-    assert durations.of(person) == {}
+    assert durations.of(Recorded.of(person)) == {}
     _measured(durations)
-    found = durations.of(person)
+    found = durations.of(Recorded.of(person))
     assert list(found) == list(QUALITIES)
     assert 60 < found["quick"] < found["good"] < found["best"]
     kept(person, "left", WEBM, seconds=40.0)
-    assert durations.of(person)["quick"] > found["quick"]
+    assert durations.of(Recorded.of(person))["quick"] > found["quick"]
     person.remove("text-1")
-    assert durations.of(person) == found
+    assert durations.of(Recorded.of(person)) == found
     person.remove("left")
-    assert durations.of(person) == {}
+    assert durations.of(Recorded.of(person)) == {}
     durations.close()
 
 
@@ -59,7 +60,7 @@ def test_a_machine_that_cannot_be_measured_shows_no_time(person, said, text):
     said(text)
     kept(person, "text-1", WEBM, seconds=40.0)
     durations = _measured(Durations(lambda: False, MODULE))
-    assert durations.of(person) == {}
+    assert durations.of(Recorded.of(person)) == {}
     durations.close()
 
 
@@ -70,7 +71,7 @@ def test_a_machine_at_work_is_measured_later(person, said, monkeypatch):
     durations = _measured(Durations(lambda: busy.pop(0), MODULE))
     assert busy == []
     kept(person, "text-1", WEBM, seconds=40.0)
-    assert durations.of(person)
+    assert durations.of(Recorded.of(person))
     durations.close()
 
 

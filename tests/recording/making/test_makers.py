@@ -15,10 +15,12 @@ from ico3d.failures import FAILURES
 from ico3d.recording.keeping import people as keeping
 from ico3d.recording.keeping.body_choice import BodyChoice, write_choice
 from ico3d.recording.keeping.people import People
+from ico3d.recording.keeping.person import Person
 from ico3d.recording.making import makers as room
 from ico3d.recording.making.makers import Bodies, Makers
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, read_progress, write_progress
+from ico3d.recording.making.sources import Recorded
 from ico3d.recording.refusals import Refused
 from support.studio_page.parts import begun, kept
 
@@ -285,13 +287,17 @@ def test_what_has_changed_since_a_making_began_is_known(people, makers):
     makers.begin(ada, "good")
     _until(_began(ada).exists)
     makers.stop(ada)
-    assert makers.changed(ada, makers.progress(ada)) == []
+
+    def changed():
+        return makers.changed(ada, makers.progress(ada), Recorded.of(ada))
+
+    assert changed() == []
     write_choice(ada.folder, BodyChoice(True))
-    assert makers.changed(ada, makers.progress(ada)) == ["on"]
+    assert changed() == ["on"]
     kept(ada, "text-2", WEBM)
-    assert makers.changed(ada, makers.progress(ada)) == ["parts", "on"]
+    assert changed() == ["parts", "on"]
     makers.begin(ada, "good")
-    assert makers.changed(ada, makers.progress(ada)) == []
+    assert changed() == []
 
 
 def test_nobody_waits_for_the_removal_of_what_another_one_made(people, makers, monkeypatch):
@@ -323,6 +329,31 @@ def test_nobody_waits_for_the_removal_of_what_another_one_made(people, makers, m
         held.clear()
         removed.clear()
         makers.stop(ada)
+
+
+def test_nobody_waits_for_the_crowded_parts_of_another_one(people, makers, monkeypatch):
+    """Side by side, removals of 20,000 files each held up all others for 15 s."""
+    held, removed, at_once = threading.Event(), [], []
+
+    def slow(person, id, until):
+        at_once.append(len(at_once) - len(removed))  # of the others, those that go on
+        assert held.wait(20) and until <= time.time()
+        removed.append((person.name, id))
+
+    monkeypatch.setattr(keeping, "PATIENCE", 0.2)
+    monkeypatch.setattr("ico3d.recording.keeping.person.MOST_FILES", 1)
+    monkeypatch.setattr(Person, "remove_rest", slow)
+    names = ("Ada", "Ida")
+    took = []
+    for name in names:
+        begin = time.monotonic()
+        makers.withdraw(people.person(name), "text-1")
+        took.append(time.monotonic() - begin)
+        assert people.person(name).part("text-1") is None  # what one sees goes at once
+    assert took[0] > 0.19 and took[1] < 0.15
+    held.set()
+    _until(lambda: len(removed) == 2)
+    assert removed == [(name, "text-1") for name in names] and at_once == [0, 0]
 
 
 def test_a_making_is_begun_anew_or_discarded_and_a_finished_avatar_stays(people, makers):

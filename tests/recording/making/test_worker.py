@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from ico3d.avatar.forgetting.removal import check_idle
 from ico3d.creating.events import Advanced, Made, Measured
-from ico3d.errors import CaptureError
+from ico3d.errors import CaptureError, SettingsError
 from ico3d.recording.beside import stop
 from ico3d.recording.keeping.people import People
 from ico3d.recording.making import worker
@@ -87,6 +88,19 @@ def test_the_body_of_another_is_asked_for(person, asked, tmp_path, monkeypatch):
     assert worker.main() == 0
     looks = [(settings.build, settings.outfit) for settings in asked]
     assert looks == [("medium", "recorded")] * 2 + [("sturdy", "wine")]
+
+
+def test_nobody_is_forgotten_while_a_making_writes_there(person, asked, tmp_path, monkeypatch):
+    """Also before `create` begins, which has a lock of its own."""
+    _recorded(person, tmp_path, "consent", "text-1")
+    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
+    monkeypatch.setattr(worker, "limit_to_free_memory", lambda: None)
+    monkeypatch.setattr(worker.sys, "argv", ["worker", str(person.folder), "quick"])
+    Places(person.folder).folder.mkdir()
+    check_idle([person.folder])
+    assert worker.main() == 0
+    with pytest.raises(SettingsError, match=r"a process works at .*making just now"):
+        check_idle([person.folder])
 
 
 def test_a_making_that_takes_more_than_is_free_ends_with_a_sentence(person, tmp_path):

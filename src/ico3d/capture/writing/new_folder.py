@@ -1,6 +1,5 @@
 """Folders of recordings that appear once they are complete."""
 
-import fcntl
 import json
 import os
 import re
@@ -93,7 +92,7 @@ def _begun(out: Path) -> tuple[Path, int]:
     while True:
         work = out.with_name(f".{out.name}.{secrets.token_hex(4)}")
         work.mkdir()  # not mkdtemp: who may read it is for the umask to say
-        lock = _locked(work)
+        lock = files.locked_folder(work)
         if lock is not None and os.path.isdir(work):
             return work, lock
         if lock is not None:  # another process took it for a left one, before it was locked
@@ -105,23 +104,7 @@ def _remove_left(out: Path) -> None:
     for folder in out.parent.iterdir():
         if not is_unfinished(folder.name) or folder.name[1:-9] != out.name:
             continue
-        lock = None if os.path.islink(folder) else _locked(folder)
+        lock = None if os.path.islink(folder) else files.locked_folder(folder)
         if lock is not None:
             files.remove_folder(folder)
             os.close(lock)
-
-
-def _locked(folder: Path) -> int | None:
-    """An open folder that this process alone has locked; None where another holds it."""
-    try:
-        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        return None
-    except OSError:
-        pass  # a file system without locks
-    return lock

@@ -1,6 +1,7 @@
 """Whether an avatar at a URL is as visitors need it."""
 
 import asyncio
+import re
 import socket
 import ssl
 import time
@@ -18,6 +19,7 @@ from ico3d.chat.serving.guard import LOOPBACK
 from ico3d.errors import SettingsError
 
 LOGS = "look at the log of proxy and server."
+TOKEN = re.compile(r"[!-~]{1,1000}")
 RENEWED = 14  # days before its end by which a certificate should have been renewed
 
 
@@ -223,7 +225,8 @@ def token_for(client: Client, key: str) -> str | None:
     headers = {"Authorization": f"Bearer {key}", "Accept-Encoding": "identity"}
     answer = fetch(client, "/token", "POST", headers=headers)
     token = answer.table.get("token")
-    return token if answer.status == 200 and isinstance(token, str) else None
+    usable = isinstance(token, str) and TOKEN.fullmatch(token)
+    return token if answer.status == 200 and usable else None
 
 
 def of_bundle(client: Client, token: str | None) -> Finding:

@@ -92,6 +92,8 @@ async def _fetched(client: Client, path: str, method: str, request: dict[str, An
                 answer = await http.send(sent, stream=True)
         except TimeoutError as error:
             raise httpx.ReadTimeout(f"no head of an answer in {PATIENCE:g} s") from error
+        except (httpx.InvalidURL, ValueError) as error:  # httpx reads where a redirect leads
+            raise httpx.RemoteProtocolError("it leads to no address") from error
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout_at(end):
                 async for piece in answer.aiter_raw():

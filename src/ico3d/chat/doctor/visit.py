@@ -24,6 +24,14 @@ FOREIGN = "https://foreign.example"
 FAULTS = (OSError, WebSocketException, TimeoutError, ProtocolError)
 
 
+class Straight(connect):
+    """Opens a WebSocket where it was told to: no server sends this machine elsewhere."""
+
+    def process_redirect(self, exc: Exception) -> Exception:
+        """The error that a redirect is."""
+        return exc
+
+
 class Visitor:
     """Opens the WebSockets of a server as its own page would."""
 
@@ -56,9 +64,9 @@ class Visitor:
             ]
         return [way, await self._strangers(), *await self._talk()]
 
-    def _connect(self, path: str, origin: str) -> connect:
+    def _connect(self, path: str, origin: str) -> Straight:
         address = self._url.replace("http", "ws", 1) + path + self._admission
-        return connect(
+        return Straight(
             address,
             ssl=self._context,
             origin=origin,  # type: ignore[arg-type]

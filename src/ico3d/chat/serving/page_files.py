@@ -21,6 +21,7 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Receive, Scope, Send
+from starlette.websockets import WebSocketClose
 
 from ico3d.common.files import resolved
 
@@ -72,6 +73,8 @@ class PageFiles(StaticFiles):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers in turn; nothing is looked for on behalf of those who have left meanwhile."""
+        if scope["type"] == "websocket":  # to which no file is an answer
+            return await WebSocketClose()(scope, receive, send)
         async with self._turns:
             if await Request(scope, receive).is_disconnected():
                 return

@@ -237,7 +237,9 @@ async def over_http(server: McpServer) -> AsyncIterator["Client"]:
             transport=sending,
             cookies=NoCookies(),
         ) as http,
-        Client(asked_nothing(streamable_http_client(server.url, http_client=http))) as client,
+        Client(
+            asked_nothing(streamable_http_client(server.url, http_client=http), server.where)
+        ) as client,
     ):
         yield unvalidated(client)
 
@@ -259,7 +261,8 @@ async def as_program(server: McpServer) -> AsyncIterator["Client"]:
     command, *arguments = server.command
     parameters = StdioServerParameters(command=command, args=arguments, env=environment)
     with Path(os.devnull).open("w") as nowhere:  # what it says there may quote visitors and keys
-        async with Client(asked_nothing(stdio_client(parameters, errlog=nowhere))) as client:
+        line = asked_nothing(stdio_client(parameters, errlog=nowhere), server.where)
+        async with Client(line) as client:
             yield unvalidated(client)
 
 

@@ -3,6 +3,7 @@
 What else FFmpeg opens, such as play lists that name other files, is not taken.
 """
 
+SUFFIXES = (".webm", ".mp4", ".avi")
 HEAD = 16
 """Bytes by which a kind of file is known."""
 

@@ -169,27 +169,24 @@ class People:
                 nobody waits for another one's removal.
         """
         if gone:
-            self.beside(partial(self._remove, gone), 0.0 if self._turn.locked() else PATIENCE)
+            self.in_turn(partial(remove, gone))
 
-    def _remove(self, gone: list[Path]) -> None:
-        with self._turn:
-            remove(gone)
+    def in_turn(self, act: Callable[[], None]) -> None:
+        """Does what takes as long as somebody's folder has files, one such thing after another.
 
-    def beside(self, act: Callable[[], None], patience: float = PATIENCE) -> None:
-        """Does what takes as long as somebody's folder has files.
-
-        It is waited for, but not for long: then it goes on by itself, and the log says if it fails.
-        Requests have few threads.
+        It is waited for, but not for long, and not at all while another one goes on: then it goes
+        on by itself, and the log says if it fails. Requests have few threads.
 
         Args:
             act: What is done; its error is raised as long as it is waited for.
-            patience: Seconds for which it is.
         """
         end: Future[None] = Future()
+        patience = 0.0 if self._turn.locked() else PATIENCE
 
         def run() -> None:
             try:
-                act()
+                with self._turn:
+                    act()
                 end.set_result(None)
             except Exception as error:  # whatever a stranger's folder does
                 log.warning("What somebody wanted removed: %s", error)

@@ -1,17 +1,18 @@
 """What is recorded of one person: parts that grow while they are recorded, and the kept ones."""
 
 import contextlib
-import fnmatch
 import json
+import math
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ico3d.common.files import first_entries, write_atomic
-from ico3d.recording.keeping.containers import HEAD, suffix_of
+from ico3d.recording.keeping.containers import HEAD, SUFFIXES, suffix_of
 from ico3d.recording.keeping.noted import noted
 from ico3d.recording.keeping.plan import ALL_IDS, CONSENT, UPLOAD, scripts
 from ico3d.recording.refusals import Refused, no_video, nothing_arrived
@@ -26,13 +27,16 @@ TICKED, TICKED_AND_SPOKEN = ", ticked: ", ", ticked and spoken: "
 """How a person agreed, as their consent says it."""
 VOICE_CONSENT = "voice_consent"
 """Entry of the consent of those who agreed that their voice is cloned, too."""
-MOST_FILES = 1000
-"""Files of the parts that are looked at; a recording has some dozens, and each page asks for them
-again and again."""
+MOST_FILES = 200
+"""Entries of the folder of parts among which takes are looked for; a recording has a hundred at
+most, and each page asks for them again and again."""
 UNSEEN: dict[str, Any] = {"seconds": 0.0, "turn": None, "advice": []}
 """What is said of a part of which nobody knows what was found in it."""
 MOST_TAKES = 4
 """Unfinished takes of one part that are kept; older ones make room."""
+
+
+Take = tuple[Path, os.stat_result]
 
 
 @dataclass(frozen=True)
@@ -91,12 +95,13 @@ class Person:
 
     def parts(self) -> Iterator[Part]:
         """All parts, kept ones and those whose recording broke off."""
-        yield from filter(None, map(self.part, sorted(ALL_IDS)))
+        takes = self._takes()  # before the kept ones: what is kept meanwhile is one of these
+        found = (self._found(id, takes[id]) for id in sorted(ALL_IDS))
+        yield from (part for part in found if part is not None)
 
     def part(self, id: str) -> Part | None:
         """One part; None where nothing of it was recorded."""
-        checked_id(id)
-        return self._found(id) or self._found(id)  # a listing may miss what is renamed meanwhile
+        return self._found(checked_id(id), ()) or self._found(id, self._takes()[id])
 
     def append(self, id: str, take: str, offset: int, data: bytes) -> int:
         """Adds bytes to a take; those that it has already are taken as repeated.
@@ -158,7 +163,7 @@ class Person:
         write_atomic(self._parts / f"{id}.json", json.dumps(report, indent=1).encode())
         if before is not None and before != kept:
             before.unlink()
-        for other in self._takes(id):
+        for other, _ in self._takes()[id]:
             other.unlink()
         if id == CONSENT:
             self._state(TICKED, TICKED_AND_SPOKEN)
@@ -167,13 +172,30 @@ class Person:
         """Removes a take of which nothing can be made."""
         self._take(id, take).unlink(missing_ok=True)
 
-    def remove(self, id: str) -> None:
-        """Removes a part, its takes and what was found in it."""
-        for file in self._parts.glob(f"{checked_id(id)}.*"):
-            if os.path.islink(file) or not os.path.isdir(file):
-                file.unlink()
+    def remove(self, id: str) -> bool:
+        """Removes a part, its takes and what was found in it.
+
+        Returns:
+            Whether more files lie there than are looked at; `remove_rest` removes those of the
+            part.
+        """
+        entries = first_entries(self._parts, MOST_FILES + 1)
+        seen = [entry.name for entry in entries if entry.name.startswith(f"{checked_id(id)}.")]
+        for name in {*seen, *(f"{id}{suffix}" for suffix in (*SUFFIXES, ".json"))}:
+            _remove_file(self._parts / name)
         if id == CONSENT:
             self._state(TICKED_AND_SPOKEN, TICKED)
+        return len(entries) > MOST_FILES
+
+    def remove_rest(self, id: str, until: float) -> None:
+        """Removes all other files of a part that have not changed since a time, however many.
+
+        Args:
+            id: The part.
+            until: The time in seconds since 1970: what is recorded anew meanwhile stays.
+        """
+        for file in self._parts.glob(f"{checked_id(id)}.*"):
+            _remove_file(file, until)
 
     def _state(self, before: str, now: str) -> None:
         """Says of the consent how it was given."""
@@ -191,10 +213,9 @@ class Person:
             raise Refused("part", "what is there is no take.", 404)
         return file
 
-    def _found(self, id: str) -> Part | None:
-        """A part as one listing shows it, the kept one before takes of a new one."""
-        files = list(self._files(f"{id}.*"))
-        kept, takes = _kept_of(files), with_stat(f for f in files if f.suffix == UNFINISHED)
+    def _found(self, id: str, takes: Sequence[Take]) -> Part | None:
+        """A part, the kept one before takes of a new one."""
+        kept = self._kept(id)
         if kept is not None:
             return Part(id, kept, "", self._report(id))
         if not takes:
@@ -202,23 +223,28 @@ class Person:
         largest, _ = max(takes, key=lambda take: take[1].st_size)
         return Part(id, largest, largest.name.split(".")[1], None)
 
-    def _takes(self, id: str) -> list[Path]:
-        """Unfinished takes of a part, the oldest first."""
-        takes = with_stat(self._files(f"{id}.*{UNFINISHED}"))
-        return [file for file, _ in sorted(takes, key=lambda take: take[1].st_mtime)]
-
     def _kept(self, id: str) -> Path | None:
-        return _kept_of(self._files(f"{id}.*"))
+        """The recording of a part; what a link leads to may be anything of this machine."""
+        files = (self._parts / f"{id}{suffix}" for suffix in SUFFIXES)
+        return next((file for file in files if _is_regular(file)), None)
 
-    def _files(self, pattern: str) -> Iterator[Path]:
-        """Files of the parts; what a link leads to may be anything of this machine."""
+    def _takes(self) -> defaultdict[str, list[Take]]:
+        """Unfinished takes of each part, the oldest first; others may be kept or go meanwhile."""
+        found: defaultdict[str, list[Take]] = defaultdict(list)
         for entry in first_entries(self._parts, MOST_FILES):
-            fits = fnmatch.fnmatchcase(entry.name, pattern)
-            if fits and entry.is_file(follow_symlinks=False):
-                yield self._parts / entry.name
+            id, _, rest = entry.name.partition(".")
+            if id not in ALL_IDS or not rest.endswith(UNFINISHED):
+                continue
+            with contextlib.suppress(FileNotFoundError):
+                about = entry.stat(follow_symlinks=False)
+                if stat.S_ISREG(about.st_mode):
+                    found[id].append((self._parts / entry.name, about))
+        for takes in found.values():
+            takes.sort(key=lambda take: take[1].st_mtime)
+        return found
 
     def _make_room(self, id: str) -> None:
-        for old in self._takes(id)[: -(MOST_TAKES - 1)]:
+        for old, _ in self._takes()[id][: -(MOST_TAKES - 1)]:
             old.unlink()
 
     def _report(self, id: str) -> dict[str, Any]:
@@ -240,15 +266,16 @@ def checked_id(id: str) -> str:
     return id
 
 
-def _kept_of(files: Iterable[Path]) -> Path | None:
-    """The recording among the files of a part."""
-    return next((file for file in files if file.suffix not in (UNFINISHED, ".json")), None)
+def _is_regular(file: Path) -> bool:
+    try:
+        return stat.S_ISREG(file.lstat().st_mode)
+    except OSError:
+        return False
 
 
-def with_stat(files: Iterable[Path]) -> list[tuple[Path, os.stat_result]]:
-    """Files with what the system says of them, but those that are gone meanwhile."""
-    found = []
-    for file in files:
-        with contextlib.suppress(FileNotFoundError):
-            found.append((file, file.stat()))
-    return found
+def _remove_file(file: Path, until: float = math.inf) -> None:
+    """Removes a file, unless it has changed since, is gone, or is a folder."""
+    with contextlib.suppress(FileNotFoundError):
+        about = file.lstat()
+        if about.st_ctime <= until and not stat.S_ISDIR(about.st_mode):
+            file.unlink()

@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping
 from ico3d.creating.plan import expected
 from ico3d.creating.settings import QUALITIES, QualityName
 from ico3d.recording.beside import start, stop
-from ico3d.recording.keeping.person import Person
 from ico3d.recording.making.pace import SAID
-from ico3d.recording.making.sources import recorded_seconds
+from ico3d.recording.making.sources import Recorded
 
 PACE = "ico3d.recording.making.pace"
 AGAIN = 5.0
@@ -40,12 +39,12 @@ class Durations:
         """Begins to measure in the background, as soon as nothing is being made."""
         self._thread.start()
 
-    def of(self, person: Person) -> Mapping[QualityName, float]:
+    def of(self, recorded: Recorded) -> Mapping[QualityName, float]:
         """Expected seconds of each quality for what is recorded.
 
         Empty where nothing is, or as long as nobody knows how fast the machine is.
         """
-        seconds, step = recorded_seconds(person), self._step
+        seconds, step = recorded.seconds, self._step
         if step is None or not seconds:
             return {}
         return {name: sum(expected(one, seconds, step).values()) for name, one in QUALITIES.items()}

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +25,7 @@ from ico3d.recording.keeping.person import Person, checked_id
 from ico3d.recording.keeping.plan import CONSENT
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Progress, begun, read_progress, write_progress
-from ico3d.recording.making.sources import signature, sources
+from ico3d.recording.making.sources import Recorded, signature
 from ico3d.recording.refusals import Refused
 
 _log = logging.getLogger(__name__)
@@ -111,7 +112,8 @@ class Makers:
         if quality not in QUALITIES:
             raise Refused("quality", f"there is no quality {quality[:20]!r}.")
         person.check_spoken()
-        if not sources(person):
+        recorded = Recorded.of(person)
+        if not recorded.sources:
             said = "nothing is recorded: record some parts, or choose a video."
             raise Refused("nothing", said, 409)
         with self._clearing() as gone:
@@ -121,7 +123,7 @@ class Makers:
             if anew:
                 gone += self._people.set_aside(folder)
             folder.mkdir(exist_ok=True)
-            of = self._made_of(person)
+            of = self._made_of(person, recorded)
             write_progress(folder, begun(folder, cast(QualityName, quality), of))
             log_file = folder / LOG
             if os.path.islink(log_file) or not os.path.isfile(log_file):  # nothing of ours
@@ -198,8 +200,10 @@ class Makers:
                 for made in (places.work, places.joined, places.joined_of, places.made):
                     gone += self._people.set_aside(made)
         if gone:
-            self._people.beside(partial(remove_unfinished, places.folder))
-        self._people.beside(partial(person.remove, id))
+            self._people.in_turn(partial(remove_unfinished, places.folder))
+        now = time.time()
+        if person.remove(id):
+            self._people.in_turn(partial(person.remove_rest, id, now))
 
     @contextlib.contextmanager
     def _clearing(self) -> Iterator[list[Path]]:
@@ -211,14 +215,14 @@ class Makers:
         finally:
             self._people.remove(gone)
 
-    def changed(self, person: Person, progress: Progress) -> list[str]:
+    def changed(self, person: Person, progress: Progress, recorded: Recorded) -> list[str]:
         """What is another since a making began: `parts`, `on` (the body), both or nothing."""
-        now = self._made_of(person)
+        now = self._made_of(person, recorded)
         return [name for name in now if progress.made_of.get(name) != now[name]]
 
-    def _made_of(self, person: Person) -> dict[str, Any]:
+    def _made_of(self, person: Person, recorded: Recorded) -> dict[str, Any]:
         """What tells the recording and the body that was chosen from others."""
-        return {"parts": signature(sources(person)), "on": self._bodies.words(person)}
+        return {"parts": signature(recorded.sources), "on": self._bodies.words(person)}
 
     def go_on(self) -> None:
         """Goes on with what was being made when the server ended."""

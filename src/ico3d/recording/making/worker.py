@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from ico3d.avatar.embodying.look import UNCHANGED, Look
 from ico3d.avatar.forgetting.removal import remove
-from ico3d.common.files import json_of, write_atomic
+from ico3d.common.files import json_of, locked_folder, write_atomic
 from ico3d.common.unpacking.limits import limit_to_free_memory
 from ico3d.common.unpacking.memory import ran_out
 from ico3d.creating.create import create
@@ -27,7 +27,7 @@ from ico3d.recording.keeping.plan import UPLOAD
 from ico3d.recording.making.joining import join
 from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import Reporter, begun
-from ico3d.recording.making.sources import signature, sources
+from ico3d.recording.making.sources import Recorded, signature
 
 
 def make(
@@ -91,7 +91,7 @@ def _short(sentence: str, folder: Path) -> str:
 
 def _video(person: Person, places: Places) -> Path:
     """The video that was brought, or the parts as one; what was made of another one is cleared."""
-    files = sources(person)
+    files = Recorded.of(person).sources
     if not files:
         raise CaptureError.of("nothing")
     now = signature(files)
@@ -126,6 +126,7 @@ def main() -> int:
     limit_to_free_memory()
     folder, quality, *on = sys.argv[1:]
     body, look = (Path(on[0]), Look(*cast(list[Any], on[1:]))) if on else (None, UNCHANGED)
+    locked_folder(Places(Path(folder)).folder)  # so that `ico3d forget` waits for the end
     try:
         make(Person(Path(folder)), cast(QualityName, quality), body, look)
     except Ico3dError as error:

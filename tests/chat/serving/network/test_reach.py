@@ -109,6 +109,15 @@ def test_a_key_does_not_travel_unencrypted():
         find_reach("0.0.0.0", [], False, None, None)
 
 
+def test_strangers_behind_a_proxy_are_not_taken_for_users_of_this_machine(tmp_path):
+    """Without a name they came as who is on this machine, and showed no key."""
+    for tls in (False, True):
+        with pytest.raises(SettingsError, match=r"--proxy 127.0.0.1: add --name"):
+            find_reach("127.0.0.1", [], tls, None, None, ["127.0.0.1"], folder=tmp_path)
+    assert find_reach("127.0.0.1", ["a.example"], False, None, None, ["127.0.0.1"]).is_public
+    assert find_reach("0.0.0.0", [], False, None, None, ["172.18.0.0/16"]).is_public
+
+
 def test_a_key_that_holds_up_everybody_is_told(tmp_path, monkeypatch):
     key = rsa.generate_private_key(65537, 2048)
     name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "avatar.example.org")])

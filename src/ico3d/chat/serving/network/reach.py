@@ -147,8 +147,8 @@ def find_reach(
         now: The time, with its zone; by default that of the machine.
 
     Raises:
-        SettingsError: If a name is not a host name, a proxy no address, a certificate cannot be
-            used, or keys would travel unencrypted.
+        SettingsError: If a name is not a host name, a proxy no address or without a name to come
+            by, a certificate cannot be used, or keys would travel unencrypted.
     """
     now = now or datetime.now(UTC)
     names = tuple(dict.fromkeys(map(checked_name, names)))
@@ -161,17 +161,21 @@ def find_reach(
     machine = own_names(host)
     if (cert is None) != (key is None):
         raise SettingsError("--tls-cert and --tls-key belong together: give both or neither.")
+    certificate = None
     if cert is not None and key is not None:
         certificate = given_certificate(cert, key, now)
         own = [name for name in certificate.names if HOST_NAME.fullmatch(name)]
-        outside = [name for name in own if name not in LOOPBACK]
-        return Reach(host, tuple(dict.fromkeys([*names, *outside])), machine, certificate, proxies)
-    if not tls:
-        return Reach(host, names, machine, None, proxies)
-    hosts = {*LOOPBACK, *names, *machine}
-    if host not in LOOPBACK:
-        hosts |= {*machine_addresses(host)}
-    certificate = own_certificate(folder or state_folder(), hosts, now)
+        names = tuple(dict.fromkeys([*names, *(name for name in own if name not in LOOPBACK)]))
+    if proxies and host in LOOPBACK and not names:
+        raise SettingsError(
+            f"--proxy {proxies[0]}: add --name with the host name under which visitors come to the "
+            "proxy, or they would be taken for users of this machine."
+        )
+    if tls and certificate is None:
+        hosts = {*LOOPBACK, *names, *machine}
+        if host not in LOOPBACK:
+            hosts |= {*machine_addresses(host)}
+        certificate = own_certificate(folder or state_folder(), hosts, now)
     return Reach(host, names, machine, certificate, proxies)
 
 
