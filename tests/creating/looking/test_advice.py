@@ -12,6 +12,8 @@ WORDS = Path(__file__).parents[3] / "viewer" / "src" / "words"
 def test_moments_that_lie_close_are_one_span():
     assert spans_of([7.5, 1.0, 1.5, 2.0, 7.0], 0.6) == ((1.0, 2.0), (7.0, 7.5))
     assert spans_of([], 1.0) == ()
+    many = spans_of(range(0, 9000, 3), 1.0)  # all of a film of hours
+    assert len(many) == 40 and many[-1] == (117, 117)
 
 
 def test_seconds_are_told_before_the_text():

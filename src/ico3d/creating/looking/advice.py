@@ -10,6 +10,9 @@ Level = Literal["refused", "better"]
 """Whether nothing can be made of the video, or something better could."""
 Values = Mapping[str, float | str]
 """What stands in a text, by its name there."""
+MOST_SPANS = 40
+"""Spans of one advice: a film may have thousands, nobody reads more than some, and each page that
+shows them asks for all again and again."""
 
 
 @dataclass(frozen=True)
@@ -47,14 +50,19 @@ class Advice:
 
 
 def spans_of(seconds: Sequence[float], apart: float) -> tuple[tuple[float, float], ...]:
-    """Moments as spans: those that lie no farther than `apart` from each other are one."""
+    """Moments as spans, `MOST_SPANS` at most: moments no farther than `apart` from another are one.
+
+    Args:
+        seconds: The moments.
+        apart: Seconds.
+    """
     spans: list[tuple[float, float]] = []
     for second in sorted(seconds):
         if spans and second - spans[-1][1] <= apart:
             spans[-1] = (spans[-1][0], second)
         else:
             spans.append((second, second))
-    return tuple(spans)
+    return tuple(spans[:MOST_SPANS])
 
 
 def when(spans: Sequence[tuple[float, float]], most: int = 4) -> str:

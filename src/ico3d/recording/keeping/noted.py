@@ -6,9 +6,9 @@ from typing import Any
 from ico3d.common.files import read_small
 from ico3d.common.typed import parse_json
 
-MOST = 64 << 10
-"""Bytes of such a file. A page asks for a dozen of them at once, again and again, and each may be a
-stranger's, who gave somebody the folder."""
+MOST, MOST_VALUES = 16 << 10, 2_000
+"""Bytes of such a file, and lists, objects and entries in it. A page asks for a dozen of them at
+once, again and again, and each may be a stranger's, who gave somebody the folder."""
 
 
 def noted(file: Path) -> dict[str, Any]:
@@ -16,6 +16,9 @@ def noted(file: Path) -> dict[str, Any]:
 
     Raises:
         OSError: If it is not there, no regular file, or larger than `MOST`.
-        ValueError: If it is no object of JSON.
+        ValueError: If it is no object of JSON, or has more than `MOST_VALUES`.
     """
-    return parse_json(read_small(file, links=False, most=MOST), file.name, ValueError)
+    data = read_small(file, links=False, most=MOST)
+    if sum(map(data.count, (b"[", b"{", b","))) > MOST_VALUES:
+        raise ValueError(f"{file.name}: it has more than {MOST_VALUES:,} values.")
+    return parse_json(data, file.name, ValueError)
