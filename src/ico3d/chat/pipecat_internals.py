@@ -132,6 +132,13 @@ def keep_segment(recognition: Any, sound: bytearray) -> None:
     recognition._audio_buffer = sound
 
 
+@touches(_SEGMENTS, "_audio_buffer", "_user_speaking")
+def forget_segment(recognition: Any) -> None:
+    """Ends a voice of which nothing is to be transcribed."""
+    recognition._audio_buffer.clear()
+    recognition._user_speaking = False
+
+
 @touches("pipecat.services.whisper.stt:WhisperSTTService", "_model")
 def use_model(recognition: Any, model: Any) -> None:
     """Gives a Whisper recogniser a model that is already loaded."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncGenerator
 
 import numpy as np
@@ -18,7 +19,14 @@ from pipecat.services.stt_service import SegmentedSTTService, STTService
 from pipecat.utils.errors import ErrorCategory
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.pipecat_internals import is_user_speaking, keep_segment, segment, transcribe_segment
+from ico3d.chat.pipecat_internals import (
+    forget_segment,
+    is_user_speaking,
+    keep_segment,
+    segment,
+    transcribe_segment,
+)
+from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import MAX_QUESTION
 from ico3d.errors import SettingsError
 
@@ -30,7 +38,9 @@ SEARCHED, MOMENT = (
     5.0,
     0.1,
 )  # s before the cut in which a quiet moment is looked for, and its length
-MOST_WAITING = 5  # cut stretches without a transcript; further ones are given up
+MOST_WAITING = 5  # stretches without a transcript; further ones are given up
+STRETCH_RATE, STRETCHES_AT_ONCE = 2.0, 20  # that end per second for long, and at once
+TOO_FAST = "the recogniser is slower than the visitor speaks."
 SIGN_OF_LIFE = 0.5  # s; pipecat gives up a turn of which nothing is heard for much longer
 
 
@@ -85,12 +95,31 @@ class Segments(SegmentedSTTService):
         super().__init__(ttfs_p99_latency=longest, **options)
         self._longest_speech = longest_speech
         self._unanswered = 0  # stretches of speech
+        self._has_told = False  # that some were given up, since all before had been answered
+        self._pace = Bucket(STRETCH_RATE, STRETCHES_AT_ONCE, time.monotonic)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Counts the stretches of speech."""
-        if isinstance(frame, VADUserStoppedSpeakingFrame):
+        """Counts the stretches of speech; a page may press and release its button without a pause.
+
+        Of those that are given up the others end the turn.
+        """
+        if not isinstance(frame, VADUserStoppedSpeakingFrame):
+            await super().process_frame(frame, direction)
+        elif self._unanswered < MOST_WAITING and self._pace.take(1):
             self._unanswered += 1
-        await super().process_frame(frame, direction)
+            await super().process_frame(frame, direction)
+        else:
+            forget_segment(self)
+            await STTService.process_frame(self, frame, direction)  # the class between keeps it
+            await self._give_up()
+            if self._unanswered == 0:
+                await self.push_frame(blank())
+
+    async def _give_up(self) -> None:
+        """Says once that some speech is given up."""
+        if not self._has_told:
+            self._has_told = True
+            await self.push_error(TOO_FAST)
 
     async def process_audio_frame(self, frame: InputAudioRawFrame, direction: FrameDirection):
         """Adds sound; unbroken speech that exceeds the limit is transcribed in pieces."""
@@ -107,7 +136,7 @@ class Segments(SegmentedSTTService):
             self._unanswered += 1
             await transcribe_segment(self)
         else:
-            await self.push_error("the recogniser is slower than the visitor speaks.")
+            await self._give_up()
         keep_segment(self, rest)
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
@@ -124,6 +153,7 @@ class Segments(SegmentedSTTService):
         finally:
             await self.cancel_task(busy)
             self._unanswered -= 1
+            self._has_told = self._has_told and self._unanswered > 0
         if not any(isinstance(frame, TranscriptionFrame) for frame in frames):
             frames.append(blank())
         for frame in frames:
