@@ -11,7 +11,7 @@ import stat
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, cast
+from typing import IO, Any, cast
 
 from ico3d.common.typed import loose_json
 from ico3d.errors import StorageError
@@ -220,6 +220,17 @@ def first_entries(folder: Path, most: int) -> list[os.DirEntry[str]]:
             return list(itertools.islice(entries, most))
     except OSError:
         return []
+
+
+def own_file(file: Path) -> IO[bytes]:
+    """A file that is kept open to be written, made where there is none.
+
+    Raises:
+        OSError: If it is a link, which may lead to any file of this machine, or a pipe.
+    """
+    if not os.path.islink(file):
+        check_regular(file)
+    return open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW, 0o666), "wb")
 
 
 def locked_folder(folder: Path) -> int | None:

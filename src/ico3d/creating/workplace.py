@@ -8,14 +8,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from ico3d.avatar.embodying.look import UNCHANGED
 from ico3d.avatar.forgetting.removal import remove
 from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.people.voice import VOICE as TONE
-from ico3d.common.files import check_regular, read_object, write_atomic
+from ico3d.common.files import own_file, read_object, write_atomic
 from ico3d.common.people.stated import is_stated
 from ico3d.common.typed import plain
 from ico3d.creating.looking.advice import Advice
@@ -110,7 +109,7 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
         raise SettingsError(f"{out} exists already: choose another name, or remove it.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = _own(folder / "lock")
+        lock = own_file(folder / "lock")
     except OSError as error:
         raise StorageError(f"{folder} cannot be written ({error.strerror or error}).") from error
     with lock:
@@ -125,17 +124,6 @@ def workplace(settings: CreateSettings) -> Iterator[Workplace]:
         yield place
         ended(folder)
         note(folder, done=True)
-
-
-def _own(file: Path) -> IO[bytes]:
-    """A file that is kept open, made where there is none.
-
-    Raises:
-        OSError: If it is a link, which may lead to any file of this machine, or a pipe.
-    """
-    if not os.path.islink(file):
-        check_regular(file)
-    return open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW, 0o666), "wb")
 
 
 def _check_same(place: Workplace, settings: CreateSettings) -> None:

@@ -70,11 +70,11 @@ class Studio:
         from ico3d.chat.serving.network.reach import find_reach, fragment
         from ico3d.chat.serving.sites import open_sites, shown_key
         from ico3d.chat.settings.embedding import Embedding
-        from ico3d.common.files import locked_folder, resolved
         from ico3d.creating.voice.clone import hindrance
         from ico3d.errors import SettingsError
         from ico3d.recording.app import make_app, open_room
         from ico3d.recording.keeping.body_choice import BodyChoice
+        from ico3d.recording.keeping.people import held
         from ico3d.recording.making.makers import Bodies
 
         look = Look(self.build, self.outfit)
@@ -93,10 +93,7 @@ class Studio:
         listener = server.bind(self.host, self.port)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            if locked_folder(resolved(self.folder)) is None:  # held until this process ends
-                raise SettingsError(
-                    f"{self.folder} is served by another ico3d studio: use its page, or end it."
-                )
+            lock = held(self.folder)  # until this process ends
             where = (self.folder.absolute(), self.host, self.tls)
             bodies = Bodies(self.body or Path(NAME), BodyChoice(self.body is not None, look))
             room = open_room(*where, bodies, self.voice)
@@ -117,4 +114,5 @@ class Studio:
         sys.stdout.flush()
         if self.browser:
             webbrowser.open(f"{url}{fragment(key)}")
-        server.make_server(app, reach.certificate).run(sockets=[listener])
+        with lock:
+            server.make_server(app, reach.certificate).run(sockets=[listener])

@@ -18,6 +18,7 @@ from ico3d.chat.wire.protocol import (
     Error,
     Hello,
     Say,
+    Talk,
     Text,
 )
 from ico3d.errors import ProtocolError
@@ -75,6 +76,21 @@ def test_nobody_types_several_questions_a_second(kind):
     for _ in range(60):
         time.now += 1.0
         limits.check_message(kind("who are you"))
+
+
+def test_no_hand_presses_a_button_many_times_a_second():
+    """Each press had a hosted recogniser asked, and a gigabyte of silence queued in 16 minutes."""
+    time = Time()
+    limits = SessionLimits(time)
+    for _ in range(30):
+        limits.check_message(Talk(True))
+        limits.check_message(Talk(False))
+    with pytest.raises(ProtocolError, match="presses"):
+        limits.check_message(Talk(True))
+    for _ in range(60):
+        limits.check_message(Talk(False))  # or the microphone would stay open
+        time.now += 0.34
+        limits.check_message(Talk(True))
 
 
 def test_rates_are_limited_by_the_clock():

@@ -1,6 +1,9 @@
 """Whose recordings there are: names, consent, room on the disk, and that deleting is deleting."""
 
+import errno
 import json
+import os
+import stat
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -271,3 +274,29 @@ def test_of_a_folder_of_thousands_some_are_looked_at(tmp_path, monkeypatch):
     for number in range(100):
         (people.folder / f"n{number}").mkdir()
     assert people.names() == [] and len(looked) <= 20
+
+
+@pytest.mark.parametrize("odd", ["link", "folder", "pipe", "full"])
+def test_no_strangers_lock_keeps_the_server_from_starting(tmp_path, monkeypatch, caplog, odd):
+    lock, elsewhere = tmp_path / room.LOCK, tmp_path / "elsewhere"
+    elsewhere.write_text("theirs")
+    if odd == "link":
+        lock.symlink_to(elsewhere)
+    elif odd == "folder":
+        lock.mkdir()
+    elif odd == "pipe":
+        os.mkfifo(lock)
+    else:
+        full = OSError(errno.ENOSPC, "No space left on device")
+        monkeypatch.setattr(room, "own_file", lambda file: (_ for _ in ()).throw(full))
+    with room.held(tmp_path):
+        assert "Another studio may serve" in caplog.text
+    assert elsewhere.read_text() == "theirs"
+
+
+def test_nobody_else_on_the_machine_can_hold_the_lock(tmp_path):
+    with room.held(tmp_path), pytest.raises(SettingsError, match="served by another"):
+        room.held(tmp_path)
+    assert stat.S_IMODE((tmp_path / room.LOCK).stat().st_mode) == 0o600
+    room.held(tmp_path).close()
+    assert People(tmp_path).names() == []

@@ -21,6 +21,7 @@ from ico3d.errors import ProtocolError
 STALL = 60  # s for which a network may hold back what a microphone makes, and deliver it at once
 AUDIO_RATE = 1.25 * MICROPHONE_RATE  # samples per second for long: clocks differ a little
 QUESTIONS, AT_ONCE = 1.0, 10  # per second for long, and at once: each has a language model begin
+PRESSES, PRESSES_AT_ONCE = 3.0, 30  # of the button: each begins and ends a stretch of speech
 RETURNS, RETURNS_AT_ONCE = 0.5, 10  # resumptions: each has all that was missed sent again
 FORGIVEN = 5  # broken rules after which a connection is closed
 FORGOTTEN = 10.0  # s after which one of them is forgotten
@@ -45,6 +46,7 @@ class SessionLimits:
         self._sounds = Bucket(MAX_RATE, STALL * MICROPHONE_RATE / MICROPHONE_CHUNK, now)
         self._samples = Bucket(AUDIO_RATE, STALL * MICROPHONE_RATE, now)
         self._questions = Bucket(QUESTIONS, AT_ONCE, now)
+        self._presses = Bucket(PRESSES, PRESSES_AT_ONCE, now)
         self._returns = Bucket(RETURNS, RETURNS_AT_ONCE, now)
         self._forgiveness = Bucket(1 / FORGOTTEN, FORGIVEN - 1, now)
 
@@ -62,16 +64,18 @@ class SessionLimits:
             raise ProtocolError(f"more than {MAX_RATE} messages per second.")
 
     def check_message(self, message: ClientMessage) -> None:
-        """Counts the sound of a message, and typed questions.
+        """Counts the sound of a message, typed questions, and presses of the button.
 
         Raises:
-            ProtocolError: If more sound arrives than a microphone can record, or more questions
-                than somebody can type.
+            ProtocolError: If more sound arrives than a microphone can record, more questions than
+                somebody can type, or more presses than a hand makes.
         """
         if isinstance(message, Audio) and not self._samples.take(len(message.pcm)):
             raise ProtocolError("more sound than a microphone makes.")
         if isinstance(message, Text | Say) and not self._questions.take(1):
             raise ProtocolError("more questions than somebody can type: wait a little.")
+        if isinstance(message, Talk) and message.pressed and not self._presses.take(1):
+            raise ProtocolError("more presses of the button than a hand makes: wait a little.")
 
     def forgive(self) -> bool:
         """Counts a violation; False if there were too many in a short time."""

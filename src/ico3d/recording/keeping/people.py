@@ -1,6 +1,7 @@
 """The folder of all recordings: whose there are, and how one begins."""
 
 import contextlib
+import fcntl
 import json
 import logging
 import os
@@ -15,10 +16,11 @@ from concurrent.futures import Future
 from datetime import date
 from functools import partial
 from pathlib import Path
+from typing import IO
 
 from ico3d.avatar.forgetting.removal import GONE, remove
 from ico3d.bundle.people.provenance import Provenance, provenance_to_json
-from ico3d.common.files import first_entries, write_atomic
+from ico3d.common.files import first_entries, own_file, write_atomic
 from ico3d.common.people.spelling import spelled
 from ico3d.creating.settings import OWN_USE
 from ico3d.errors import SettingsError
@@ -41,6 +43,7 @@ MOST, MOST_ENTRIES = 100, 1000
 """Number of people whose recordings one folder holds, and of what is looked at there."""
 PATIENCE, LAST = 1.0, 5.0
 """Seconds that somebody waits for a removal, and that the end of the server waits for all."""
+LOCK = ".studio.lock"
 SPARE = 200_000_000
 """Bytes that stay free on the disk."""
 
@@ -212,6 +215,30 @@ class People:
         names = (entry.name for entry in first_entries(self.folder, MOST_ENTRIES))
         with contextlib.suppress(SettingsError):
             self.remove([self.folder / name for name in names if GONE.fullmatch(name)])
+
+
+def held(folder: Path) -> IO[bytes]:
+    """Keeps a folder of recordings to one server, as long as what is returned is open.
+
+    Another one would go on with the same makings, and write what the first one deletes. The lock is
+    a file that nobody else may read: whoever can open a folder could hold its own. Where there can
+    be none, on a full disk or in a stranger's folder, nothing is kept.
+
+    Raises:
+        SettingsError: If another server holds it.
+    """
+    try:
+        lock = own_file(folder / LOCK)
+        os.fchmod(lock.fileno(), 0o600)
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise SettingsError(
+            f"{folder} is served by another ico3d studio: use its page, or end it."
+        ) from error
+    except OSError as error:
+        log.warning("Another studio may serve %s, too: %s", folder, error)
+        return open(os.devnull, "wb")
+    return lock
 
 
 def is_name(text: str) -> bool:
