@@ -136,7 +136,7 @@ class Demo:
             arrays: dict[str, Any] = slenderer(dict(np.load(self.subject)), SLENDER)
             write_atomic(person, lambda path: np.savez_compressed(path, **arrays))
         # moods and glances are nothing that a voice could drive, except for a smile, which is told
-        self._record(person, work / "head-capture", "head", self.head_shot, "--manner", "smiling")
+        self._record(person, work / "head-capture", "head", self.head_shot, "--manner", "beaming")
         body = (work / "body-capture", "body", self.body_shot)
         self._record(person, *body, "--motion", "conversation", "--manner", "friendly")
         self._train_head(work / "head-capture", work / "head")

@@ -19,7 +19,7 @@ from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
 from ico3d.bundle.skinned.lamp import POINT_UNIT
-from ico3d.common.expression import LIDS, SPEECH_SIZE
+from ico3d.common.expression import FACE_NAMES, LIDS, SPEECH_SIZE
 from ico3d.rig.rig import Rig
 
 RESTS = Rest(16, 17)
@@ -56,6 +56,9 @@ EVENED = 0.8
 AWAKE = 0.1
 """Share of the way that lids take as they close by which hers are wider open: those of the files
 hang low at rest, and people who saw her called her sleepy."""
+CALMER = 0.25
+"""Share of the way from rest to the widest smile by which she smiles less at rest: in the middle of
+what she recorded her lips begin to part over the teeth."""
 
 
 def write_finished(path: Path) -> None:
@@ -63,7 +66,7 @@ def write_finished(path: Path) -> None:
     bundle = Bundle.open(path)
     assert bundle.skinned is not None
     body = evened(muted(tailored(narrower(bundle.skinned))))
-    head, gestures = awake(bundle.require_head()[0]), gesture_files(body, (), 1.0)
+    head, gestures = composed(bundle.require_head()[0]), gesture_files(body, (), 1.0)
     write_person(path, bundle, bundle.manifest, head, body, gestures)
 
 
@@ -122,12 +125,20 @@ def evened(body: BakedSkinned) -> BakedSkinned:
     return replace(body, color_logits=logits.astype(np.float16), shapes=changed)
 
 
-def awake(head: BakedHead) -> BakedHead:
-    """The head of somebody who speaks with lids that are `AWAKE`."""
-    lids = [SPEECH_SIZE + lid for lid in LIDS]
-    opened = head.b1 - AWAKE * head.w1[lids].sum(0)
-    moved = head.displacement_b1 - AWAKE * head.displacement_w1[lids].sum(0)
-    return replace(head, b1=opened, displacement_b1=moved)
+def composed(head: BakedHead) -> BakedHead:
+    """The head of somebody who speaks with lids that are `AWAKE`, and a smile `CALMER` at rest."""
+    lids, smile = [SPEECH_SIZE + lid for lid in LIDS], SPEECH_SIZE + FACE_NAMES.index("smile")
+
+    def with_rest(weights: np.ndarray, biases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rest = biases - AWAKE * weights[lids].sum(0) - CALMER * weights[smile]
+        wider = weights.copy()
+        wider[smile] *= 1 + CALMER  # at its widest it is what it was
+        return wider, rest
+
+    w1, b1 = with_rest(head.w1, head.b1)
+    displacement_w1, displacement_b1 = with_rest(head.displacement_w1, head.displacement_b1)
+    moved = {"displacement_w1": displacement_w1, "displacement_b1": displacement_b1}
+    return replace(head, w1=w1, b1=b1, **moved)
 
 
 def narrower(body: BakedSkinned) -> BakedSkinned:

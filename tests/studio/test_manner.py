@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ico3d.studio.acting.manner import GLAD, MANNERS, mannered
+from ico3d.common.espeak.speech import Phoneme
+from ico3d.studio.acting.manner import BEAMING, GLAD, MANNERS, PARTED, mannered
 from ico3d.studio.acting.performance import SOUND_RATE, perform
 from ico3d.studio.choice import load_subject
 from support.needs import needs
@@ -53,7 +54,8 @@ def test_a_smiling_person_is_now_grave_and_now_laughs_and_neither_changes_within
     smile = mannered(anny, longer, "smiling", 3).weights[
         :, anny.blendshape_names.index("mouthSmileLeft")
     ]
-    least, most = (share * GLAD["mouthSmileLeft"] for share in MANNERS["smiling"])
+    how = MANNERS["smiling"]
+    least, most = (share * GLAD["mouthSmileLeft"] for share in (how.least, how.most))
     assert smile.min() == pytest.approx(least, abs=0.02)
     assert smile.max() == pytest.approx(most, abs=0.02)
     assert np.abs(smile[5:] - smile[:-5]).max() < 0.25 * (most - least)  # a fifth of a second
@@ -61,11 +63,32 @@ def test_a_smiling_person_is_now_grave_and_now_laughs_and_neither_changes_within
     assert np.abs(other - mannered(anny, longer, "smiling", 3).weights).max() > 0.3
 
 
-@pytest.mark.parametrize(("manner", "most"), [("friendly", 0.003), ("smiling", 0.0035)])
+@pytest.mark.parametrize(
+    ("manner", "most"), [("friendly", 0.003), ("smiling", 0.0035), ("beaming", 0.0035)]
+)
 def test_a_smile_keeps_lips_closed_at_bilabials(anny, manner, most):
-    smile = MANNERS[manner][1] * anny.weights(GLAD)
+    smile = MANNERS[manner].most * anny.weights(dict(MANNERS[manner].smile))
     gaps = {}
     for viseme in ("PP", "aa"):
         marks = anny.landmarks(anny.posed(np.minimum(anny.visemes[viseme] + smile, 1)))
         gaps[viseme] = np.linalg.norm(marks[62] - marks[66])
     assert gaps["PP"] < most and gaps["aa"] > 0.012
+
+
+def test_a_wide_smile_shows_teeth_but_not_at_bilabials(anny, acted):
+    seconds = 40
+    spoken = [Phoneme(0.5 * n, "m" if n % 2 else "") for n in range(2 * seconds)]
+    silent = replace(
+        acted,
+        weights=np.zeros((25 * seconds, len(anny.blendshape_names)), np.float32),
+        samples=np.zeros(seconds * SOUND_RATE, np.float32),
+        phonemes=tuple(spoken),
+    )
+    weights = mannered(anny, silent, "beaming").weights
+    smile = weights[:, anny.blendshape_names.index("mouthSmileLeft")]
+    jaw = weights[:, anny.blendshape_names.index("jawOpen")]
+    half = BEAMING["mouthSmileLeft"] * (MANNERS["beaming"].least + MANNERS["beaming"].most) / 2
+    closed = (np.arange(len(jaw)) / 25 - 0.6) % 1 < 0.3  # well within each m
+    assert jaw.max() == pytest.approx(PARTED["jawOpen"], abs=0.001)
+    assert (jaw[closed | (smile <= half)] == 0).all()
+    assert (jaw[~closed & (smile > half)] > 0).mean() > 0.7

@@ -62,7 +62,7 @@ class Synthetic:
     gaze: Literal["visitor", "ahead"] = "visitor"
     """Where the person looks between glances: at who stands before the first camera, whatever the
     head does (`visitor`), or where the head points (`ahead`)."""
-    manner: Literal["neutral", "friendly", "smiling"] = "neutral"
+    manner: Literal["neutral", "friendly", "smiling", "beaming"] = "neutral"
     """How the face is all the time, whatever it says: as it is (`neutral`), with a slight smile of
     mouth and eyes (`friendly`), or with one that comes and goes (`smiling`)."""
     traits: tuple[Literal["glasses", "beard", "long-hair", "dark-skin", "child"], ...] = ()

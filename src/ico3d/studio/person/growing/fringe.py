@@ -45,14 +45,14 @@ def curtain(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Pat
     level = random.random(count) ** 0.6  # 1: on the surface
     ways = _falling(start, parted, of_lock, lock, random)
     t = np.linspace(0, 1, POINTS)
-    full = 0.004 + 0.011 * np.sin(np.pi * np.minimum(1, 1.15 * t) ** 0.8) ** 1.2
+    full = 0.004 + 0.0075 * np.sin(np.pi * np.minimum(1, 1.15 * t) ** 0.8) ** 1.2
     flick = (0.007 + 0.005 * of_lock[:, 2])[:, None] * t**4
     lift = skull.scale * (full * (0.35 + 0.65 * level[:, None]) * (1 - np.exp(-9 * t)) + flick)
     above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)  # (N,)
     points = skull.on(ways, above[:, None] * np.exp(-6 * t) + 0.0008 + lift)
     for one in (parted >= 0, parted < 0):
         points[one] = clumped(points[one], 0.15, 70, 0.8)
-    points += 0.0042 * waves(LOCKS, POINTS, 0.75, random)[lock]
+    points += 0.0030 * waves(LOCKS, POINTS, 0.75, random)[lock]
     points += 0.0012 * waves(count, POINTS, 0.7, random)
     depth = np.clip(1 - level + 0.2 * edge, 0, 1)[:, None] * np.minimum(1, 4 * t)
     taper = np.broadcast_to(0.9 - 0.7 * t**2, depth.shape)
