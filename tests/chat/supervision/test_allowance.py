@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.services import choose
 from ico3d.chat.serving.sessions import STARTS_AT_ONCE, HastyError
 from ico3d.chat.settings.conversation import ChatSettings, Choice, Turns
 from ico3d.chat.settings.visits import Visits
-from ico3d.chat.supervision.allowance import Allowance, Bucket
+from ico3d.chat.supervision.allowance import Allowance
 from ico3d.chat.wire.protocol import (
     VERSION,
     Answer,
@@ -39,17 +40,6 @@ BROWSER = choose(ChatSettings(recognition=Choice("browser", {"fallback": ""}))).
 
 def limited(**limits):
     return ChatSettings(turns=TURNS, limits=Visits(**limits))
-
-
-def test_what_was_taken_comes_back():
-    now = 0.0
-    bucket = Bucket(0.5, 2.0, lambda: now)
-    assert [bucket.take(1) for _ in range(3)] == [True, True, False]
-    bucket.drain(5)
-    now = 2.0
-    assert bucket.has(1) and not bucket.has(1.1)
-    now = 60.0
-    assert bucket.take(2) and not bucket.take(0.1)
 
 
 def test_the_scarcest_bucket_decides():

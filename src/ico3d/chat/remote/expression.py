@@ -13,9 +13,9 @@ from typing import TypeGuard
 import numpy as np
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.remote.door import BROKEN
 from ico3d.chat.serving.limits import FORGIVEN, FORGOTTEN
-from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, MAX_BINARY_FRAME, SPEECH_RATE
 from ico3d.chat.wire.remote_expression import FINISH, PATH, ROW, START
 from ico3d.common.expression import SPEECH_SIZE

@@ -6,7 +6,7 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Generator
 from typing import Any
 
-from ico3d.chat.supervision.allowance import Bucket
+from ico3d.chat.bucket import Bucket
 
 MOST_SOCKETS = 64
 """Open WebSockets of one machine; a classroom or an office may share its address."""

@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from ico3d.chat.supervision.allowance import Bucket
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.wire.protocol import (
     MAX_BURST,
     MAX_RATE,

@@ -5,6 +5,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import replace
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.conversation import Conversation
 from ico3d.chat.observing.metrics import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
@@ -14,7 +15,7 @@ from ico3d.chat.serving.crowd import Meters
 from ico3d.chat.serving.freeing import give_back
 from ico3d.chat.serving.limits import Inlet, SessionLimits
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
-from ico3d.chat.supervision.allowance import Allowance, Bucket
+from ico3d.chat.supervision.allowance import Allowance
 from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
 from ico3d.chat.wire.sentences import ENDING, FAULT, IDLE, LONG
 from ico3d.errors import ServiceError

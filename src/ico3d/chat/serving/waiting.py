@@ -5,8 +5,8 @@ import secrets
 from collections import deque
 from collections.abc import Callable, Collection
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.serving.limits import RETURNS, RETURNS_AT_ONCE
-from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import RESUME_SECONDS
 
 MOST_WAITING = 50  # visitors; each holds an open connection

@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 
 import httpx2
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.services.bounded import (
     Events,
     Limits,
@@ -17,7 +18,6 @@ from ico3d.chat.services.bounded import (
     taking_turns,
 )
 from ico3d.chat.services.tls import client_context
-from ico3d.chat.supervision.allowance import Bucket
 
 MESSAGE = Limits(1 << 20, 8_000)
 """Bytes and parts of an answer, which may be the list of all functions.

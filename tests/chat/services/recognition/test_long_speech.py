@@ -21,13 +21,13 @@ from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.tests.utils import SleepFrame, run_test
 from pipecat.utils.time import time_now_iso8601
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.remote.headless import run
 from ico3d.chat.services import ChosenService, choose
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition import openai, sphinx, whisper
 from ico3d.chat.services.recognition.segments import BLANK, TOO_FAST, Segments
 from ico3d.chat.settings.conversation import ChatSettings, Choice
-from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.wire.protocol import Answer, Transcript
 from ico3d.errors import SettingsError

@@ -19,6 +19,7 @@ from pipecat.services.stt_service import SegmentedSTTService, STTService
 from pipecat.utils.errors import ErrorCategory
 from pipecat.utils.time import time_now_iso8601
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.pipecat_internals import (
     forget_segment,
     is_user_speaking,
@@ -26,7 +27,6 @@ from ico3d.chat.pipecat_internals import (
     segment,
     transcribe_segment,
 )
-from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import MAX_QUESTION
 from ico3d.errors import SettingsError
 

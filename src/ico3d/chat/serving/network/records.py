@@ -7,8 +7,8 @@ and a client may ask for new keys or a new handshake in records that nothing abo
 import asyncio
 import time
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.serving.crowd import Meters
-from ico3d.chat.supervision.allowance import Bucket
 
 HEAD = 5  # bytes: type, version, length
 CHANGE_CIPHER, HANDSHAKE = 20, 22  # types, in the clear whatever the records hold

@@ -11,8 +11,8 @@ from typing import Any
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.serving.crowd import GONE, MOST_SOCKETS, Crowd, peer_of
-from ico3d.chat.supervision.allowance import Bucket
 from ico3d.chat.wire.protocol import MAX_BURST, MAX_RATE
 
 SLICE = 1 << 11  # bytes that are parsed at once: of frames of six bytes, some hundred
