@@ -164,7 +164,7 @@ test.skipIf(!demo)('consent, parts, a retake, a closed page, and everything dele
   await again.waitForSelector('#start:visible');
   await again.waitForSelector('#problem.told');
   expect(await again.textContent('#problem')).toBe('Everything of Ida is gone.');
-  expect(readdirSync(folder)).toEqual(['notes.txt']);
+  expect(readdirSync(folder)).toEqual(['.studio.lock', 'notes.txt']); // the lock is nobody's
   await again.goBack(); // to an address of hers
   await again.waitForSelector('#problem.told');
   expect(await again.textContent('#problem')).toBe('Everything of Ida is gone.');

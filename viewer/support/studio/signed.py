@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from ico3d.recording.keeping.person import Person
-from ico3d.recording.making.sources import signature, sources
+from ico3d.recording.making.sources import Recorded, signature
 
 if __name__ == "__main__":
-    print(json.dumps(signature(sources(Person(Path(sys.argv[1]))))))
+    print(json.dumps(signature(Recorded.of(Person(Path(sys.argv[1]))).sources)))

@@ -44,6 +44,7 @@ MOST, MOST_ENTRIES = 100, 1000
 PATIENCE, LAST = 1.0, 5.0
 """Seconds that somebody waits for a removal, and that the end of the server waits for all."""
 LOCK = ".studio.lock"
+"""File of the folder that keeps it to one server."""
 SPARE = 200_000_000
 """Bytes that stay free on the disk."""
 
