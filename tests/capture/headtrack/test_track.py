@@ -106,7 +106,8 @@ def test_a_frame_without_pictures_is_interpolated(head, tmp_path, capsys):
 def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     if not PERSON.is_file():
         pytest.skip("../shared/subjects is not here")
-    shape = dict(subject=str(PERSON), rig="body", cameras=5, views_per_frame=5)
+    # Of five, those beside the one in front stand at 72°: they see a profile behind locks of hair.
+    shape = dict(subject=str(PERSON), rig="body", cameras=6, views_per_frame=6)
     truth, folder = _recorded(tmp_path, frames=2, fps=15.0, size=704, **shape)
     assert main(["capture", "track", str(folder)]) == 0
     degrees, metres = _agreement(truth, open_capture(folder))
