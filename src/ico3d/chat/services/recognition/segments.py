@@ -101,7 +101,8 @@ class Segments(SegmentedSTTService):
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Counts the stretches of speech; a page may press and release its button without a pause.
 
-        Of those that are given up the others end the turn.
+        A stretch that is given up has no transcript. The turn ends with the last one that is on
+        its way, or with a blank one.
         """
         if not isinstance(frame, VADUserStoppedSpeakingFrame):
             await super().process_frame(frame, direction)
