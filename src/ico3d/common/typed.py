@@ -291,20 +291,23 @@ def plain(value: Any) -> Any:
     return value
 
 
-def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any:
+def parse_json(
+    data: bytes, name: str, error: Callable[[str], Exception], most: int = MOST_VALUES
+) -> Any:
     """Parses strict JSON: UTF-8, no NaN or Infinity, no repeated key.
 
     Args:
         data: The text.
         name: What the text is, at the start of error sentences.
         error: Makes the exception to raise from one sentence.
+        most: Lists, objects and their entries that it may have.
 
     Raises:
-        Exception: `error`, if the data is not strict JSON, or has more than `MOST_VALUES`.
+        Exception: `error`, if the data is not strict JSON, or has more than `most`.
     """
     try:
         text = data.decode("utf-8")
-        _check_values(text, MOST_VALUES)
+        _check_values(text, most)
         return json.loads(
             text,
             object_pairs_hook=_unique_keys,

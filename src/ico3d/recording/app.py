@@ -301,12 +301,12 @@ def _add_making(app: FastAPI, room: Room) -> None:
 
 def _status(room: Room, person: Person) -> dict[str, Any]:
     """All that the page shows of a person."""
-    about, recorded = person.consent(), Recorded.of(person)
+    recorded = Recorded.of(person)
     language, found = recorded.language, recorded.parts
     script = scripts()[language]
     texts = {f"text-{n}": one.text for n, one in enumerate(script.texts, 1)}
     texts[CONSENT] = script.consent.format(name=person.name)
-    if VOICE_CONSENT in about:
+    if VOICE_CONSENT in recorded.consent:
         texts[CONSENT] += ("" if language in UNSPACED else " ") + script.voice
     parts = [
         {"id": id, "text": texts.get(id, script.aloud)} | _of_part(found.get(id))

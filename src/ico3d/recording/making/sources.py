@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ico3d.recording.keeping.person import Part, Person
 from ico3d.recording.keeping.plan import CONSENT, UPLOAD, part_ids
@@ -15,11 +16,11 @@ class Recorded:
     """What was recorded of a person when somebody looked.
 
     Attributes:
-        language: The language in which they read.
+        consent: What they agreed to, with the language in which they read.
         parts: The parts by name, kept ones and those whose recording broke off.
     """
 
-    language: str
+    consent: Mapping[str, Any]
     parts: Mapping[str, Part]
 
     @classmethod
@@ -29,7 +30,12 @@ class Recorded:
         Raises:
             Refused: If the person's consent is damaged.
         """
-        return cls(person.consent()["language"], {part.id: part for part in person.parts()})
+        return cls(person.consent(), {part.id: part for part in person.parts()})
+
+    @property
+    def language(self) -> str:
+        """The language in which they read."""
+        return self.consent["language"]
 
     @property
     def sources(self) -> list[Path]:
