@@ -1,7 +1,8 @@
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
 import { drawnBy } from '../support/browser/path.ts';
-import { slowNetwork, type Wire } from '../support/browser/wire.ts';
+import { watchWire, type Wire } from '../support/browser/wire.ts';
+import { SlowLine } from '../support/servers/slow.ts';
 import { slowness } from '../support/slowness.ts';
 
 const RATE = 10e6; // bit/s
@@ -12,12 +13,12 @@ const MOST_SCRIPT = 1.2e6; // bytes of it
 const SECOND_VISIT = 30e3; // bytes: the page and the manifest
 const { demoUrl } = inject('shared');
 
-/** Opens the page and gives the seconds until its first screen has a name, and until somebody is drawn. */
-async function visit(browser: Browser): Promise<[named: number, drawn: number]> {
+/** Opens a page and gives the seconds until its first screen has a name, and until somebody is drawn. */
+async function visit(url: string, browser: Browser): Promise<[named: number, drawn: number]> {
   const { page } = browser;
   const begun = performance.now();
   const since = () => (performance.now() - begun) / 1000;
-  await page.goto(drawnBy('webgl', demoUrl!), { waitUntil: 'commit' });
+  await page.goto(drawnBy('webgl', url), { waitUntil: 'commit' });
   await page.waitForFunction(() => document.getElementById('name')?.textContent);
   const named = since();
   await page.waitForFunction(() => (window.ico3d?.stage.frames ?? 0) > 0);
@@ -25,6 +26,7 @@ async function visit(browser: Browser): Promise<[named: number, drawn: number]> 
 }
 
 describe.skipIf(!demoUrl)('a first visit to the packaged person at 10 Mbit/s (needs src/ico3d/chat/data/demo.ico3d)', () => {
+  let line: SlowLine;
   let browser: Browser;
   let wire: Wire;
   let seconds: number;
@@ -32,14 +34,18 @@ describe.skipIf(!demoUrl)('a first visit to the packaged person at 10 Mbit/s (ne
 
   beforeAll(async () => {
     browser = await Browser.launch({ width: 160, height: 120, calm: true });
-    wire = await slowNetwork(browser.page, RATE, LATENCY);
-    const [named, drawn] = await visit(browser);
+    line = await SlowLine.to(demoUrl!, RATE, LATENCY);
+    wire = await watchWire(browser.page);
+    const [named, drawn] = await visit(line.url, browser);
     seconds = drawn;
     first = structuredClone(wire);
     console.log(`a name after ${named.toFixed(2)} s, a face after ${seconds.toFixed(2)} s, ${(first.bytes / 1e6).toFixed(2)} MB, ${(first.scripts / 1e6).toFixed(2)} MB of it script`);
   });
 
-  afterAll(() => browser?.close());
+  afterAll(async () => {
+    await browser?.close();
+    line?.close();
+  });
 
   test('shows a face soon, after few bytes', () => {
     expect(seconds).toBeLessThan(LONGEST * slowness());
@@ -58,7 +64,7 @@ describe.skipIf(!demoUrl)('a first visit to the packaged person at 10 Mbit/s (ne
   test('keeps all of it but the page and the manifest for the next visit', async () => {
     await browser.page.waitForLoadState('networkidle'); // windows of the body that come after the first picture
     const before = wire.bytes;
-    await visit(browser);
+    await visit(line.url, browser);
     expect(wire.bytes - before).toBeLessThan(SECOND_VISIT);
   });
 });

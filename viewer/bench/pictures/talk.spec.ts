@@ -6,13 +6,14 @@ import { inject, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
 import { scratchFolder } from '../../support/scratch.ts';
 import { ChatServer } from '../../support/servers/server.ts';
+import { SlowLine } from '../../support/servers/slow.ts';
 import { keepSound, makeVoice } from '../../support/browser/talk.ts';
 import { drawnBy } from '../../support/browser/path.ts';
 import { Album } from './album.ts';
 import { arrive, ask, greeted, Line, silent } from './visitor.ts';
 
 const SIZE = { width: 800, height: 520 };
-const MEGABIT = 1e6 / 8;
+const MEGABIT = 1e6; // bit/s
 const { demo, demoUrl } = inject('shared');
 
 /** Waits until the overlay says a sentence. */
@@ -32,16 +33,14 @@ async function coming(album: Album): Promise<void> {
   const { page } = browser;
   await page.emulateMedia({ colorScheme: 'dark', reducedMotion: 'reduce' });
   await keepSound(page);
-  const network = await browser.context.newCDPSession(page);
-  await network.send('Network.enable');
-  await network.send('Network.emulateNetworkConditions', { offline: false, latency: 40, downloadThroughput: 3 * MEGABIT, uploadThroughput: MEGABIT });
-  await page.goto(drawnBy('soft', demoUrl!));
+  const line = await SlowLine.to(demoUrl!, 3 * MEGABIT, 40);
+  await page.goto(drawnBy('soft', line.url));
   await page.waitForFunction(() => document.querySelector<HTMLProgressElement>('#progress')!.value > 0.4);
   await album.shoot(page, 'Loading, in words');
-  await network.send('Network.disable');
   await page.waitForSelector('#choices:visible', { timeout: 60_000 });
   await album.shoot(page, 'Browsers play sound after a click only');
   await browser.close();
+  line.close();
 }
 
 /** Ready, listening, thinking, speaking, interrupted. */

@@ -7,8 +7,8 @@ export interface Wire {
   names: string[]; // of the files, in the order in which they were asked for
 }
 
-/** From now on the page's network is slow; gives what has come over it, counted by the browser. */
-export async function slowNetwork(page: Page, bitsPerSecond: number, latency: number): Promise<Wire> {
+/** Gives what comes over a page's network from now on, counted by the browser. */
+export async function watchWire(page: Page): Promise<Wire> {
   const cdp = await page.context().newCDPSession(page);
   const wire: Wire = { bytes: 0, scripts: 0, names: [] };
   const scripts = new Set<string>();
@@ -21,7 +21,5 @@ export async function slowNetwork(page: Page, bitsPerSecond: number, latency: nu
     if (scripts.has(requestId)) wire.scripts += encodedDataLength;
   });
   await cdp.send('Network.enable');
-  const throughput = bitsPerSecond / 8;
-  await cdp.send('Network.emulateNetworkConditions', { offline: false, latency, downloadThroughput: throughput, uploadThroughput: throughput });
   return wire;
 }
