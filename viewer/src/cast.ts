@@ -69,7 +69,7 @@ async function makePeople(manifest: Manifest, files: BundleFiles, stage: Stage, 
   const { head } = manifest;
   const body = bodyOf(manifest);
   if (head && body) return makePerson(files, manifest, head, body, stage, calm, ports);
-  if (head) return makeHead(files, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head), anySeed());
+  if (head) return makeHead(files, head, stage, { resting: rows(0, calm ? 0 : head.num_poses - 1), turns: false }, calm ? () => 0 : sway(head), anySeed());
   const playback = new Playback((body!.frames - 1) / body!.fps, !calm);
   return { playback, ...(await makeBody(files, manifest, playback, stage, ports.failed)) };
 }
@@ -94,7 +94,7 @@ async function makePerson(
   const seed = anySeed();
   const acting = body.skinned && !calm ? await makeActing(files, body.skinned, manifest, end, stage, seed, ports.heard) : null;
   const row = acting ? () => end : () => (body.body ?? body.skinned!).time * info.fps;
-  const shown = await makeHead(files, info, stage, resting, row, seed);
+  const shown = await makeHead(files, info, stage, { resting, turns: acting !== null }, row, seed);
   if (acting) shown.head.motion = () => acting.headMotion();
   return { ...shown, ...body, director, ...(acting ? { acting } : {}) };
 }
@@ -119,15 +119,18 @@ async function makeActing(
   return acting;
 }
 
-/**
- * @param resting the rows of its poses where the head is at rest
- * @param seed whole number, the same as that of the body's language
- */
+/** How a head is held. */
+interface Posture {
+  resting: readonly number[]; // rows of its poses where it is at rest
+  turns: boolean; // to the visitor
+}
+
+/** @param seed whole number, the same as that of the body's language */
 async function makeHead(
   files: BundleFiles,
   info: HeadInfo,
   stage: Stage,
-  resting: readonly number[],
+  { resting, turns }: Posture,
   carrier: Carrier,
   seed: number,
 ): Promise<{ head: Head; eyes?: EyeMovement }> {
@@ -136,7 +139,7 @@ async function makeHead(
   const eyes = info.gaze ? new EyeMovement(info.gaze, () => visitorOf(stage), seed) : undefined;
   if (eyes) head.eyes = eyes;
   stage.add(head);
-  stage.face(given, resting);
+  stage.face(given, resting, turns);
   return { head, eyes };
 }
 

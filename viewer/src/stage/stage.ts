@@ -167,10 +167,15 @@ export class Stage {
     this.fit();
   }
 
-  /** Points the camera at somebody whose head rests at these rows of its poses. */
-  face(head: HeadFiles, resting: readonly number[]): void {
+  /**
+   * Points the camera at somebody.
+   *
+   * @param resting the rows of the head's poses where it is at rest
+   * @param turns whether the head turns to the visitor
+   */
+  face(head: HeadFiles, resting: readonly number[], turns: boolean): void {
     const local = new THREE.Vector3(...eyesOf(head.baked, head.info));
-    const sitter = sitterOf(this.manifest, head, resting, local);
+    const sitter = sitterOf(this.manifest, head, resting, turns, local);
     this.orbit.face(person(this.manifest, sitter));
     this.meeting = meetingOf(sitter, local, Boolean(bodyOf(this.manifest)));
     this.arrange();

@@ -66,8 +66,8 @@ describe('who sits before the camera', () => {
   const files: HeadFiles = { info, baked: makeHead(), poses, shoulders: null };
   const camera = { eye: [0.5, 1.2, 3], target: [0, 0.8, 0], up: [0, 2, 0], fov_y: 30 };
   const body = { low: [-0.4, 0.02, -0.2], high: [0.4, 1.55, 0.5], windows: [{ last: 1 }] };
-  const whole = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1]);
-  const alone = sitterOf({ camera, body: null } as unknown as Manifest, files, [0, 1]);
+  const whole = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1], false);
+  const alone = sitterOf({ camera, body: null } as unknown as Manifest, files, [0, 1], false);
 
   test('their eyes are in the middle of where the head usually is', () => {
     for (const { eyes } of [whole, alone]) {
@@ -83,6 +83,12 @@ describe('who sits before the camera', () => {
     expect(alone.toward.distanceTo(recorded)).toBeLessThan(1e-9);
   });
 
+  test('whoever turns the head is met a little from the left', () => {
+    const { toward } = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1], true);
+    const angle = (24 * Math.PI) / 180;
+    expect(toward.toArray()).toEqual([expect.closeTo(Math.sin(angle), 6), 0, expect.closeTo(Math.cos(angle), 6)]);
+  });
+
   test('their extent is that of head and body', () => {
     expect(whole.crown).toBeCloseTo(0.11 - EYES.y, 2);
     expect(whole.lowest).toBeCloseTo(whole.eyes.y - 0.02, 6);
@@ -93,7 +99,7 @@ describe('who sits before the camera', () => {
   });
 
   test('many Gaussians tell the same by a few of them', () => {
-    const many = sitterOf({ camera, body } as unknown as Manifest, { ...files, baked: makeHead(0, 30 * COUNT) }, [0, 1]);
+    const many = sitterOf({ camera, body } as unknown as Manifest, { ...files, baked: makeHead(0, 30 * COUNT) }, [0, 1], false);
     expect(many.eyes.distanceTo(whole.eyes)).toBeLessThan(0.005);
     expect(many.crown).toBeCloseTo(whole.crown, 2);
     expect(many.box.max.distanceTo(whole.box.max)).toBeLessThan(0.01);
@@ -102,7 +108,7 @@ describe('who sits before the camera', () => {
   test('strays do not count', () => {
     const strayed = makeHead();
     strayed.means.set([0, 9, -9], 0);
-    const sitter = sitterOf({ camera, body: null } as unknown as Manifest, { info, baked: strayed, poses, shoulders: null }, [0]);
+    const sitter = sitterOf({ camera, body: null } as unknown as Manifest, { info, baked: strayed, poses, shoulders: null }, [0], false);
     expect(sitter.crown).toBeCloseTo(0.11 - EYES.y, 2);
     expect(sitter.box.max.y).toBeLessThan(1.65);
   });

@@ -17,21 +17,24 @@ export interface Sitter {
 const SEEN = 0.3; // opacity from which a Gaussian counts
 const STRAYS = 0.01; // share of a head's Gaussians, at either end, that may lie anywhere
 const CROWNS = [0.09, 0.25] as const; // m: from a shaved head to the highest hair
+const ASIDE = THREE.MathUtils.degToRad(24); // to the left of somebody who turns the head: people hardly ever stand square to each other
 const LEVEL = 0.5; // of a direction's length: what is steeper does not say where somebody looks
 
 /**
  * Who sits before the camera, from the bundle's own data.
  *
  * A head alone is seen from where it was recorded: only from there its look is known well. Somebody
- * with a body was recorded from all around and is met face to face.
+ * with a body was recorded from all around and is met face to face, or a little aside if the face turns to the visitor.
  *
  * @param rows of the head's poses, where the head is at rest
+ * @param turns whether the head turns to where the visitor is
  * @param local the point between the eyes in the head's own space
  */
 export function sitterOf(
   manifest: Manifest,
   files: HeadFiles,
   rows: readonly number[],
+  turns: boolean,
   local = new THREE.Vector3(...eyesOf(files.baked, files.info)),
 ): Sitter {
   const { camera } = manifest;
@@ -41,6 +44,7 @@ export function sitterOf(
   const start = new THREE.Vector3(...camera.eye);
   const recorded = start.clone().sub(body ? new THREE.Vector3(...camera.target) : eyes).normalize();
   const toward = body ? (level(forward, up) ?? level(recorded, up) ?? recorded) : recorded;
+  if (turns) toward.applyAxisAngle(up, ASIDE);
   const points = visiblePoints(files, rows[0]!);
   const heights = points.map((point) => point.clone().sub(eyes).dot(up)).sort((a, b) => a - b);
   const box = new THREE.Box3().setFromPoints(withoutStrays(points));
