@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -17,6 +18,7 @@ from support.studio_page.parts import begun, part_file
 pytestmark = [needs("av"), pytest.mark.slow]
 REPORT = {"seconds": 1.0, "turn": None, "advice": []}
 KEEP = b"POST /recordings/%s/takes/%s/keep HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
+TALK = b"POST /recordings/%s/talk HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n"
 LOOK = b"POST /recordings/Eve/look HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1\r\n\r\nx"
 
 
@@ -47,6 +49,12 @@ async def server(tmp_path, monkeypatch):
         return {"is": "seen"}
 
     monkeypatch.setattr(room.looks, "report", report)
+
+    def begin(avatar):
+        looks.append(("talk", avatar.stem))
+        return SimpleNamespace(url=lambda: told(b"url", "")["is"])
+
+    monkeypatch.setattr(room.talks, "begin", begin)
     monkeypatch.setattr(room.eye, "told", told)
     async with running(studio.make_app(room, "127.0.0.1", Sites())) as (_, listener):
         yield listener.getsockname()[1], looks, may_end
@@ -115,6 +123,24 @@ async def test_pictures_that_nobody_waits_for_are_not_looked_at(server):
     async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=60) as client:
         assert (await client.post("/recordings/Bob/look", content=b"x")).json() == {"is": "seen"}
     assert looks == [("picture", b"x")] * 2  # the one that had begun, and Bob's
+
+
+async def test_talks_that_nobody_waits_for_do_not_begin_and_hold_up_no_deletion(server):
+    port, looks, may_end = server
+    asked = []
+    for name in (b"Eve", *[b"Bob"] * 9):
+        _, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(TALK % name)
+        asked.append(writer)
+        await until(lambda: len(looks) > 0)
+    await asyncio.sleep(0.5)
+    for writer in asked:
+        writer.close()
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=5) as client:
+        assert (await client.delete("/recordings/Bob")).status_code == 204
+    may_end.set()
+    await asyncio.sleep(0.5)
+    assert looks == [("talk", "Eve"), ("picture", b"url")]
 
 
 async def test_all_who_ask_for_one_part_are_told_that_it_is_kept(server):

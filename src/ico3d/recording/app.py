@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,6 @@ from ico3d.creating.voice.clone import hindrance
 from ico3d.errors import Ico3dError, StorageError
 from ico3d.recording.guiding.coverage import covered
 from ico3d.recording.guiding.fair_queue import FairQueue
-from ico3d.recording.guiding.guide import Told
 from ico3d.recording.guiding.looking import MOST_AT_ONCE, Looks
 from ico3d.recording.guiding.seeing import Eye, turn_of
 from ico3d.recording.keeping.body_choice import BUILDS, OUTFITS, as_form, chosen, write_choice
@@ -37,7 +37,7 @@ from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import shown_face
 from ico3d.recording.making.sources import Recorded
 from ico3d.recording.making.talks import Talks
-from ico3d.recording.presence import CLIENT_GONE, while_there
+from ico3d.recording.presence import while_there
 from ico3d.recording.refusals import Refused, full_disk
 
 ROOT = "/recordings/"
@@ -198,8 +198,8 @@ def _add_parts(app: FastAPI, room: Room) -> None:
             person = room.people.person(name)
             if id != CONSENT:
                 await asyncio.to_thread(person.check_spoken)
-            room.people.check_room()
-            size = await asyncio.to_thread(person.append, id, take, offset, data)
+            with room.people.room_for(len(data)):
+                size = await asyncio.to_thread(person.append, id, take, offset, data)
         return JSONResponse({"size": size})
 
     @app.post(takes + "/keep")
@@ -218,9 +218,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
                 room.people.person(name)  # may be deleted by now
                 await asyncio.to_thread(person.keep, id, take, report)
 
-        kept = room.queue.done(person.name, file, look_and_keep)
-        if not await while_there(request, kept):
-            return Response(status_code=CLIENT_GONE)
+        await while_there(request, room.queue.done(person.name, file, look_and_keep))
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.get(part)
@@ -242,20 +240,15 @@ def _add_parts(app: FastAPI, room: Room) -> None:
     async def look(name: str, request: Request, part: str = "") -> Response:
         person = room.people.person(name)
         picture = await _body(request, LARGEST_PICTURE)
-        told: list[Told] = []
-
-        async def see() -> None:
-            told.append(await asyncio.to_thread(room.eye.told, picture, turn_of(part)))
-
-        if not await while_there(request, room.glances.done(person.name, object(), see)):
-            return Response(status_code=CLIENT_GONE)
-        return JSONResponse(plain(told[0]))
+        see = partial(asyncio.to_thread, room.eye.told, picture, turn_of(part))
+        told = await while_there(request, room.glances.done(person.name, object(), see))
+        return JSONResponse(plain(told))
 
 
 def _add_making(app: FastAPI, room: Room) -> None:
     """The making of an avatar, its progress, and the talk at its end."""
     making = ROOT + "{name}/making"
-    beginning = asyncio.Lock()  # of a talk, which holds a thread for seconds; all others need some
+    beginning = FairQueue(1)  # of talks: each holds a thread for seconds, and all others need some
 
     @app.put(ROOT + "{name}/body")
     async def choose(name: str, request: Request) -> Response:
@@ -293,10 +286,14 @@ def _add_making(app: FastAPI, room: Room) -> None:
         return Response(picture, media_type="image/jpeg", headers=NEVER_KEPT)
 
     @app.post(ROOT + "{name}/talk")
-    async def talk(name: str) -> Response:
-        async with room.lock(name), beginning:
-            avatar = Places(room.people.person(name).folder).avatar
-            return JSONResponse({"url": await asyncio.to_thread(room.talks.url, avatar)})
+    async def talk(name: str, request: Request) -> Response:
+        async def begin() -> str:
+            async with room.lock(name):
+                avatar = Places(room.people.person(name).folder).avatar
+                talk = await asyncio.to_thread(room.talks.begin, avatar)
+            return await asyncio.to_thread(talk.url)  # whoever deletes it meanwhile ends it
+
+        return JSONResponse({"url": await while_there(request, beginning.done(name, name, begin))})
 
 
 def _status(room: Room, person: Person) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """Gestures of a body on a skeleton, from sound as it is made to the page's cues."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -154,6 +156,14 @@ def test_a_speech_that_nothing_is_known_of_is_left_alone():
         cueing = Cueing(CLIPS, page, True, 3)
         heard(cueing, page, until=0.3)
         cueing.request("somersault")
+
+
+def test_a_page_that_reports_nothing_has_few_utterances_remembered():
+    cueing = Cueing(CLIPS, Recorder(), True, 3)
+    for number in range(9):
+        for frame in spoken():
+            cueing.read(replace(frame, utterance=number))
+    assert list(cueing._scripts) == [5, 6, 7, 8]
 
 
 def test_reports_in_a_flood_are_looked_at_ten_times_a_second(monkeypatch):

@@ -1,5 +1,6 @@
 """Whose recordings there are: names, consent, room on the disk, and that deleting is deleting."""
 
+import contextlib
 import errno
 import json
 import os
@@ -7,6 +8,7 @@ import stat
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 
@@ -102,7 +104,13 @@ def test_without_consent_nothing_begins(tmp_path, name, language, agreed, code):
 
 def test_of_those_who_begin_at_once_under_one_name_one_does(tmp_path, monkeypatch):
     people, together = People(tmp_path), threading.Barrier(2)
-    monkeypatch.setattr(people, "check_room", lambda: together.wait(5))  # the last look before
+
+    @contextlib.contextmanager
+    def both(_):  # the last look before
+        together.wait(5)
+        yield
+
+    monkeypatch.setattr(people, "room_for", both)
 
     def begin(voice):
         try:
@@ -136,6 +144,18 @@ def test_a_folder_holds_so_many_people_and_a_disk_so_much(tmp_path, monkeypatch)
     with pytest.raises(Refused, match="the disk is full") as refused:
         begun(tmp_path, "Ada")
     assert refused.value.status == 507 and People(tmp_path).names() == ["Ida"]
+
+
+def test_what_others_are_writing_counts_as_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: SimpleNamespace(free=room.SPARE + 30))
+    people = People(tmp_path)
+    with people.room_for(20):
+        with pytest.raises(Refused, match="the disk is full"), people.room_for(20):
+            pass
+        with people.room_for(10):
+            pass
+    with people.room_for(30):
+        pass
 
 
 def test_delete_leaves_nothing_and_nobody_else_loses_anything(tmp_path):

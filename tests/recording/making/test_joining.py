@@ -5,6 +5,7 @@ import pytest
 
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError
+from ico3d.recording.making import joining
 from ico3d.recording.making.joining import join
 from support.needs import needs
 from support.studio_page.parts import part_file
@@ -36,3 +37,11 @@ def test_a_part_of_another_shape_is_named(tmp_path):
     with pytest.raises(CaptureError, match=r"b\.mp4 has another shape than a\.mp4: record it"):
         join(files, tmp_path / "whole.mp4")
     assert not (tmp_path / "whole.mp4").exists()
+
+
+def test_all_parts_together_are_no_longer_than_one_recording_may_be(tmp_path, monkeypatch):
+    monkeypatch.setattr(joining, "RECORDING", 2.0)
+    monkeypatch.setattr(joining, "read_sound", lambda _: pytest.fail("before their sound is read"))
+    files = [part_file(tmp_path / f"{name}.mp4", 30) for name in "ab"]
+    with pytest.raises(CaptureError, match="longer than 2 s"):
+        join(files, tmp_path / "whole.mp4")

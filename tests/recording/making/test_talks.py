@@ -23,12 +23,12 @@ def avatar(tmp_path, monkeypatch):
 
 def test_an_avatar_has_one_server_until_it_is_stopped(avatar):
     serving = Talks("127.0.0.1", False)
-    url = serving.url(avatar)
+    url = serving.begin(avatar).url()
     assert url.startswith("http://127.0.0.1:") and url.endswith("/#key=a-b")
-    assert serving.url(avatar) == url
+    assert serving.begin(avatar).url() == url
     serving.stop("Ida")
-    assert serving.url(avatar) != url
-    (process, _) = serving._running["Ida"]
+    assert serving.begin(avatar).url() != url
+    process = serving._running["Ida"].process
     serving.close()
     assert process.poll() is not None
 
@@ -39,10 +39,10 @@ def test_few_talk_at_once_and_the_one_asked_for_longest_ago_ends(avatar, monkeyp
     for name in ("Ada", "Eve"):
         files.append(avatar.with_name(f"{name}.ico3d"))
         files[-1].write_text(name)
-    urls = [serving.url(file) for file in files[:2]]
-    assert serving.url(avatar) == urls[0]  # is asked for again
-    (ada, _), (ida, _) = serving._running["Ada"], serving._running["Ida"]
-    serving.url(files[2])
+    urls = [serving.begin(file).url() for file in files[:2]]
+    assert serving.begin(avatar).url() == urls[0]  # is asked for again
+    ada, ida = (serving._running[name].process for name in ("Ada", "Ida"))
+    serving.begin(files[2]).url()
     assert list(serving._running) == ["Ida", "Eve"]
     assert ada.poll() is not None and ida.poll() is None
     serving.close()
@@ -51,36 +51,49 @@ def test_few_talk_at_once_and_the_one_asked_for_longest_ago_ends(avatar, monkeyp
 def test_a_talk_that_speaks_on_is_ended_and_holds_up_nobody(avatar, monkeypatch):
     serving, slow = Talks("127.0.0.1", False), avatar.with_name("Slow.ico3d")
     slow.write_text("Stubborn")
-    serving.url(slow)
-    url = serving.url(avatar)
-    (process, _) = serving._running["Slow"]
+    serving.begin(slow).url()
+    url = serving.begin(avatar).url()
+    process = serving._running["Slow"].process
     monkeypatch.setattr(talks, "PATIENCE", 20.0)
     ending = threading.Thread(target=serving.stop, args=["Slow"], daemon=True)
     ending.start()
     while "Slow" in serving._running:
         time.sleep(0.01)
-    assert serving.url(avatar) == url and process.poll() is None
+    assert serving.begin(avatar).url() == url and process.poll() is None
     monkeypatch.setattr(talks, "PATIENCE", 0.2)
-    serving.url(slow)
-    (second, _) = serving._running["Slow"]
+    serving.begin(slow).url()
+    second = serving._running["Slow"].process
     serving.close()
     assert second.poll() is not None and process.poll() is None
     process.kill()
     ending.join()
 
 
+def test_while_one_starts_others_begin_and_end_and_it_can_be_ended(avatar):
+    serving, late = Talks("127.0.0.1", False), avatar.with_name("Late.ico3d")
+    late.write_text("Late")  # never tells its address
+    starting = serving.begin(late)
+    assert serving.begin(avatar).url().startswith("http://127.0.0.1:")
+    serving.stop("Ida")
+    assert starting.process.poll() is None
+    serving.stop("Late")
+    assert starting.process.poll() is not None
+    with pytest.raises(Refused, match="cannot talk"):
+        starting.url()
+
+
 def test_a_name_is_no_address(avatar):
     """That of a stranger's bundle is printed before the address of its server."""
     avatar.write_text("Ida is at http://203.0.113.7:9/#key=mine (Ctrl+C ends)")
     serving = Talks("127.0.0.1", False)
-    assert serving.url(avatar).startswith("http://127.0.0.1:")
+    assert serving.begin(avatar).url().startswith("http://127.0.0.1:")
     serving.close()
 
 
 def test_what_is_not_made_or_does_not_start_is_said(avatar, tmp_path):
     serving = Talks("127.0.0.1", False)
     with pytest.raises(Refused, match="not made yet"):
-        serving.url(tmp_path / "Ada.ico3d")
+        serving.begin(tmp_path / "Ada.ico3d").url()
     avatar.write_bytes(b"")
     with pytest.raises(Refused, match="cannot talk"):
-        serving.url(avatar)
+        serving.begin(avatar).url()

@@ -1,6 +1,6 @@
 """A server of an avatar that waits until it is ended; of an empty file it does not start.
 
-That of an avatar called Stubborn speaks on for a while.
+That of an avatar called Stubborn speaks on for a while, and one called Late never starts.
 """
 
 import os
@@ -20,5 +20,7 @@ if __name__ == "__main__":
     assert scheme == "plain"
     if name == "Stubborn":
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    if name == "Late":
+        threading.Event().wait()
     print(f"{name} is at http://{host}:{os.getpid()}/#key=a-b (Ctrl+C ends)", flush=True)
     threading.Event().wait()

@@ -19,6 +19,8 @@ APART = 0.1
 """Least time in seconds between two reports that are looked at; a page sends one each 0.2 s."""
 SOONEST = 0.15
 """Least time in seconds between the first heard sound of an utterance and a gesture."""
+MOST = 4
+"""Utterances that are remembered: a page that reports nothing would have all of them kept."""
 
 
 class Cueing:
@@ -68,6 +70,8 @@ class Cueing:
     def read(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
         """Takes the next piece of synthesised sound, or the end of an utterance."""
         script = self._scripts.setdefault(frame.utterance, Script())
+        for older in sorted(self._scripts)[:-MOST]:
+            del self._scripts[older]
         if isinstance(frame, SpeechFrame):
             script.add(frame)
         else:

@@ -8,8 +8,9 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
-Work = Callable[[], Awaitable[None]]
+T = TypeVar("T")
 
 
 @dataclass(eq=False)
@@ -20,14 +21,14 @@ class _Piece:
         whose: Who asked for it.
         key: What it is.
         work: Does it.
-        result: Done once the work is; fails as it did.
+        result: What the work came to; fails as it did.
         askers: How many wait for it.
     """
 
     whose: str
     key: Hashable
-    work: Work
-    result: asyncio.Future[None]
+    work: Callable[[], Awaitable[Any]]
+    result: asyncio.Future[Any]
     askers: int = 0
 
 
@@ -42,8 +43,8 @@ class FairQueue:
         """Pieces that have not begun, by person; whose turn is next comes first."""
         self._tasks: set[asyncio.Task[None]] = set()
 
-    async def done(self, whose: str, key: Hashable, work: Work) -> None:
-        """Returns when a piece of work is done.
+    async def done(self, whose: str, key: Hashable, work: Callable[[], Awaitable[T]]) -> T:
+        """What a piece of work comes to, once it is done.
 
         If all who wait for it are cancelled before it has begun, it is not done; else it is done to
         its end.
@@ -60,13 +61,13 @@ class FairQueue:
         piece.askers += 1
         self._begin_next()
         try:
-            await asyncio.shield(piece.result)
+            return await asyncio.shield(piece.result)
         finally:
             piece.askers -= 1
             if not piece.askers:
                 self._drop(piece)
 
-    def _add(self, whose: str, key: Hashable, work: Work) -> _Piece:
+    def _add(self, whose: str, key: Hashable, work: Callable[[], Awaitable[Any]]) -> _Piece:
         result = asyncio.get_running_loop().create_future()
         result.add_done_callback(lambda done: done.cancelled() or done.exception())  # all left
         self._pieces[key] = piece = _Piece(whose, key, work, result)
@@ -96,8 +97,7 @@ class FairQueue:
 
     async def _do(self, piece: _Piece) -> None:
         try:
-            await piece.work()
-            piece.result.set_result(None)
+            piece.result.set_result(await piece.work())
         except Exception as error:
             piece.result.set_exception(error)
         finally:

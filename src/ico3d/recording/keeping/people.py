@@ -11,7 +11,7 @@ import stat
 import threading
 import time
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from datetime import date
 from functools import partial
@@ -56,6 +56,7 @@ class People:
         """Keeps them below `folder`, which is made where it is missing."""
         self.folder, self._turn, self._listed = folder, threading.Lock(), threading.Lock()
         self._acts: list[threading.Thread] = []  # that go on beside
+        self._counting, self._coming = threading.Lock(), 0  # bytes that are being written
         folder.mkdir(parents=True, exist_ok=True)
 
     def names(self) -> list[str]:
@@ -104,7 +105,6 @@ class People:
             raise Refused("consent", "nothing is recorded of anybody who did not agree.", 403)
         if len(self.names()) >= MOST:
             raise Refused("many", "there are recordings of 100 people: delete some of them.", 409)
-        self.check_room()
         how = f"agreed on {today.isoformat()}{TICKED}"
         said = f"{how}“{script.consent.format(name=name)}”"
         about = Provenance("portrait", (), said, OWN_USE, name, name)
@@ -113,25 +113,37 @@ class People:
             stated[VOICE_CONSENT] = f"{how}“{script.voice}”"
         text = json.dumps(stated, indent=1, ensure_ascii=False)
         folder = self.folder / name
-        try:
-            folder.mkdir()
-        except FileExistsError as error:  # also if somebody else begins just now
-            raise Refused("taken", f"there are recordings of {name} already.", 409) from error
-        try:
-            write_atomic(folder / CONSENT_FILE, text.encode())
-        except BaseException:
-            folder.rmdir()  # or nobody could begin again
-            raise
+        with self.room_for(len(text)):
+            try:
+                folder.mkdir()
+            except FileExistsError as error:  # also if somebody else begins just now
+                raise Refused("taken", f"there are recordings of {name} already.", 409) from error
+            try:
+                write_atomic(folder / CONSENT_FILE, text.encode())
+            except BaseException:
+                folder.rmdir()  # or nobody could begin again
+                raise
         return Person(folder)
 
-    def check_room(self) -> None:
-        """Refuses to write where the disk is nearly full.
+    @contextlib.contextmanager
+    def room_for(self, size: int) -> Iterator[None]:
+        """While something is written: refuses it where the disk is nearly full.
+
+        Args:
+            size: Bytes that are written meanwhile.
 
         Raises:
-            Refused: If it is.
+            Refused: If too few would stay free, together with what others are writing.
         """
-        if shutil.disk_usage(self.folder).free < SPARE:
-            raise full_disk()
+        with self._counting:
+            if shutil.disk_usage(self.folder).free - self._coming - size < SPARE:
+                raise full_disk()
+            self._coming += size
+        try:
+            yield
+        finally:
+            with self._counting:
+                self._coming -= size
 
     def delete(self, name: str) -> None:
         """Removes everything of a person: consent, recordings, what was made of them.

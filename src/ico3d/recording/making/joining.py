@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.avatar.film.video import write_video
 from ico3d.capture.capture import Sound
 from ico3d.capture.video import SOUND_RATE, Video, open_video, read_sound
+from ico3d.common.sound import RECORDING
 from ico3d.errors import CaptureError
 
 FPS = 25
@@ -29,7 +30,8 @@ def join(files: Sequence[Path], out: Path) -> None:
         out: The .mp4 file.
 
     Raises:
-        CaptureError: If a part is no video, or has another shape than the first.
+        CaptureError: If a part is no video, or has another shape than the first, or all together
+            are longer than one recording may be.
         StorageError: If the disk is full.
     """
     videos = [open_video(file, LARGEST) for file in files]
@@ -38,8 +40,7 @@ def join(files: Sequence[Path], out: Path) -> None:
         if abs(video.width * size[1] / (video.height * size[0]) - 1) > SAME:
             names = {"part": video.path.name, "first": videos[0].path.name}
             raise CaptureError.of("shape", values=names)
-    counts = [sum(1 for _ in video.frames(FPS)) for video in videos]
-    sound = np.concatenate([_sound(v.path, n) for v, n in zip(videos, counts, strict=True)])
+    sound = _sound(videos)
     pictures = (picture for video in videos for picture in _scaled(video, size))
     write_video(out, pictures, size, FPS, Sound(sound, SOUND_RATE))
 
@@ -60,11 +61,21 @@ def _scaled(video: Video, size: tuple[int, int]) -> Iterator[np.ndarray]:
         yield picture
 
 
-def _sound(file: Path, pictures: int) -> np.ndarray:
-    """(pictures · 640,) a part's sound, cut off or filled up with silence."""
-    whole = np.zeros(pictures * SOUND_RATE // FPS, np.float32)
-    sound = read_sound(file)
-    if sound is not None:
-        heard = sound.samples[: len(whole)]
-        whole[: len(heard)] = heard
+def _sound(videos: Sequence[Video]) -> np.ndarray:
+    """(pictures · 640,) the sound of all, each cut off or filled up with silence.
+
+    Raises:
+        CaptureError: If all together are longer than one recording may be.
+    """
+    ends = [0]
+    for video in videos:
+        ends.append(ends[-1] + sum(1 for _ in video.frames(FPS)) * SOUND_RATE // FPS)
+        if ends[-1] > RECORDING * SOUND_RATE:
+            raise CaptureError.of("long", values={"n": round(RECORDING)})
+    whole = np.zeros(ends[-1], np.float32)
+    for video, begin, end in zip(videos, ends, ends[1:], strict=False):
+        sound = read_sound(video.path)
+        if sound is not None:
+            heard = sound.samples[: end - begin]
+            whole[begin : begin + len(heard)] = heard
     return whole

@@ -8,15 +8,16 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
+from ico3d.avatar.embodying.look import Look
 from ico3d.bundle.packaged import NAME
 from ico3d.common.files import remove_unfinished
 from ico3d.creating.settings import QUALITIES, QualityName
-from ico3d.errors import Ico3dError, StorageError
+from ico3d.errors import BundleError, Ico3dError, StorageError
 from ico3d.failures import FAILURES
 from ico3d.recording.beside import FULL_DISK, start, stop
 from ico3d.recording.keeping.body_choice import HEAD_ALONE, BodyChoice, read_choice
@@ -46,6 +47,9 @@ class Bodies:
 
     body: Path = Path(NAME)
     default: BodyChoice = HEAD_ALONE
+    _faults: dict[Look, str] = field(default_factory=dict, init=False, compare=False)
+    """What was found about a look; nothing where the body can have it."""
+    _finding: threading.Lock = field(default_factory=threading.Lock, init=False, compare=False)
 
     @property
     def is_packaged(self) -> bool:
@@ -62,11 +66,24 @@ class Bodies:
         Raises:
             BundleError: If it cannot look so; the sentence says why.
         """
-        if choice.wanted and not self.is_packaged:
-            from ico3d.avatar.embodying.embody import body_in
-            from ico3d.bundle.format import Bundle
+        if not choice.wanted or self.is_packaged:
+            return
+        with self._finding:  # opening the body takes a second, and who asks may ask again and again
+            if choice.look not in self._faults:
+                self._faults[choice.look] = self._fault(choice.look)
+        if fault := self._faults[choice.look]:
+            raise BundleError(fault)
 
-            body_in(Bundle.open(self.body), choice.look)
+    def _fault(self, look: Look) -> str:
+        """Why the body cannot look so; nothing if it can."""
+        from ico3d.avatar.embodying.embody import body_in
+        from ico3d.bundle.format import Bundle
+
+        try:
+            body_in(Bundle.open(self.body), look)
+        except BundleError as error:
+            return str(error)
+        return ""
 
     def words(self, person: Person) -> list[str]:
         """Body, build and outfit for the process that makes; none for a head alone."""

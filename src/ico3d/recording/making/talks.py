@@ -4,8 +4,8 @@ import os
 import re
 import subprocess
 import threading
+from concurrent.futures import Future
 from pathlib import Path
-from typing import IO
 
 from ico3d.recording.beside import start, stop
 from ico3d.recording.refusals import Refused
@@ -15,6 +15,8 @@ MOST = 4
 """Servers at once, of 150 MB each; of more, the one that was asked for longest ago ends."""
 PATIENCE = 0.5
 """Seconds in which a talk may end by itself: the sentence at hand would take longer."""
+TOLD = re.compile(rb".* is at (https?://\S+) \(Ctrl\+C ends\)$")
+"""The line in which a server tells its address, behind a name that may be anybody's."""
 
 
 class Talks:
@@ -23,42 +25,36 @@ class Talks:
     def __init__(self, host: str, tls: bool):
         """Serves on the address `host`, by HTTPS if wanted."""
         self._words = [host, "tls" if tls else "plain"]
-        self._running: dict[str, tuple[subprocess.Popen[bytes], str]] = {}
+        self._running: dict[str, Talk] = {}
         self._lock = threading.Lock()
 
-    def url(self, avatar: Path) -> str:
-        """Address of the page on which an avatar talks; its server is started where there is none.
+    def begin(self, avatar: Path) -> "Talk":
+        """The server of an avatar, which is started where there is none.
+
+        Nobody waits until it has started but who asks for its address.
 
         Raises:
-            Refused: If the avatar is not made, or cannot be served.
+            Refused: If the avatar is not made.
         """
         if os.path.islink(avatar) or not os.path.isfile(avatar):
             raise Refused("unmade", "the avatar is not made yet.", 409)
         with self._lock:
-            process, url = self._running.pop(avatar.stem, (None, ""))
-            if process is None or process.poll() is not None:
-                process, url = self._started(avatar)
-            self._running[avatar.stem] = process, url  # the one that was asked for last is the last
+            talk = self._running.pop(avatar.stem, None)
+            if talk is None or talk.process.poll() is not None:
+                process = start(TALK, [str(avatar), *self._words], subprocess.PIPE)
+                talk = Talk(avatar.name, process)
+            self._running[avatar.stem] = talk  # the one that was asked for last is the last
             over = list(self._running)[:-MOST]
         for name in over:
             self.stop(name)
-        return url
-
-    def _started(self, avatar: Path) -> tuple[subprocess.Popen[bytes], str]:
-        """A new server, with its address."""
-        process = start(TALK, [str(avatar), *self._words], subprocess.PIPE)
-        url = _read_url(process)
-        if not url:
-            stop(process)
-            raise Refused("silent", f"the avatar cannot talk: ico3d serve {avatar.name}.", 500)
-        return process, url
+        return talk
 
     def stop(self, name: str) -> None:
-        """Ends the server of somebody's avatar, if there is one."""
+        """Ends the server of somebody's avatar, if there is one, even as it starts."""
         with self._lock:
-            process, _ = self._running.pop(name, (None, ""))
-        if process is not None:  # others need not wait until it is gone
-            stop(process, PATIENCE)
+            talk = self._running.pop(name, None)
+        if talk is not None:  # others need not wait until it is gone
+            stop(talk.process, PATIENCE)
 
     def close(self) -> None:
         """Ends all servers."""
@@ -66,24 +62,43 @@ class Talks:
             self.stop(name)
 
 
-TOLD = re.compile(rb".* is at (https?://\S+) \(Ctrl\+C ends\)$")
-"""The line in which a server tells its address, behind a name that may be anybody's."""
+class Talk:
+    """The server of one avatar.
 
+    Attributes:
+        process: Its process.
+    """
 
-def _read_url(process: subprocess.Popen[bytes]) -> str:
-    """The address that a server prints; empty if it ends without one."""
-    assert process.stdout is not None
-    for line in map(bytes.rstrip, process.stdout):
-        found = TOLD.search(line)
-        if found:
-            threading.Thread(target=_drain, args=(process.stdout,), daemon=True).start()
-            return found[1].decode()
-    process.stdout.close()
-    return ""
+    def __init__(self, name: str, process: subprocess.Popen[bytes]):
+        """Reads what a process prints.
 
+        Args:
+            name: The file of the avatar.
+            process: What serves it, just started.
+        """
+        self.process = process
+        self._name = name
+        self._url: Future[str] = Future()
+        threading.Thread(target=self._read, daemon=True).start()
 
-def _drain(out: IO[bytes]) -> None:
-    """Reads what is printed to its end: a full pipe would stop the server."""
-    with out as printed:
-        for _ in printed:
-            pass
+    def url(self) -> str:
+        """Address of the page on which the avatar talks, which the server tells after seconds.
+
+        Raises:
+            Refused: If it cannot be served, or was stopped before.
+        """
+        if url := self._url.result():
+            return url
+        stop(self.process)
+        raise Refused("silent", f"the avatar cannot talk: ico3d serve {self._name}.", 500)
+
+    def _read(self) -> None:
+        """Reads what is printed to its end: a full pipe would stop the server."""
+        assert self.process.stdout is not None
+        with self.process.stdout as printed:
+            for line in printed:
+                found = TOLD.search(line.rstrip())
+                if found and not self._url.done():
+                    self._url.set_result(found[1].decode())
+        if not self._url.done():
+            self._url.set_result("")

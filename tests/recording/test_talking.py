@@ -1,0 +1,53 @@
+"""Talks of finished avatars begin one at a time, and hold up nobody else."""
+
+import asyncio
+import threading
+from datetime import date
+from types import SimpleNamespace
+
+import httpx
+import pytest
+
+from ico3d.chat.serving.sites import Sites
+from ico3d.recording import app as server
+from support.needs import needs
+
+pytestmark = [needs("av"), pytest.mark.slow]
+HOME = "http://127.0.0.1:8766"
+
+
+@pytest.fixture
+def room(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    return server.open_room(tmp_path / "recordings", "127.0.0.1", False)
+
+
+async def test_others_are_answered_while_talks_begin(room, monkeypatch):
+    for name in ("Ida", "Ada", "Eve"):
+        room.people.begin(name, "de", True, date.today())
+    begun = threading.Event()
+    starting = SimpleNamespace(url=lambda: "there" if begun.wait(20) else "")
+    monkeypatch.setattr(room.talks, "begin", lambda _: starting)
+    sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
+    async with httpx.AsyncClient(transport=sending, base_url=HOME) as client:
+        asked = [f"/recordings/{name}/talk" for name in ("Ida", "Ada") * 32]  # more than threads
+        talks = [asyncio.create_task(client.post(path)) for path in asked]
+        await asyncio.sleep(0.2)
+        shown = await asyncio.wait_for(client.get("/recordings/"), 5)
+        assert shown.json()["people"] == ["Ada", "Eve", "Ida"] and not any(t.done() for t in talks)
+        gone = await asyncio.wait_for(client.delete("/recordings/Eve"), 5)
+        assert gone.status_code == 204
+        begun.set()
+        assert {(await talk).text for talk in talks} == {'{"url":"there"}'}
+
+
+async def test_no_talk_begins_of_somebody_who_was_deleted_meanwhile(room, monkeypatch):
+    room.people.begin("Ida", "de", True, date.today())
+    monkeypatch.setattr(room.talks, "begin", lambda _: pytest.fail("it began"))
+    sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
+    async with httpx.AsyncClient(transport=sending, base_url=HOME) as client:
+        async with room.lock("Ida"):
+            talk = asyncio.create_task(client.post("/recordings/Ida/talk"))
+            await asyncio.sleep(0.1)
+            room.people.delete("Ida")
+        assert (await talk).status_code == 404
