@@ -1,6 +1,7 @@
 import * as THREE from 'three';
 import type { Backcloth } from '../soft/contract.ts';
 import { footprintOf, type Ground, type Patch } from './camera/ground.ts';
+import { windowLight, WINDOW_LIGHT } from './window-light.ts';
 
 const SHADOW = [0.3, 0.22] as const; // m to the side and to the front where it has faded to a third, until feet are known
 const SHADES = { far: 0.34, near: 0.08, sole: 0.5 } as const; // share of the light that is missing: around the feet, between them, under a sole
@@ -9,10 +10,10 @@ const LAMP = 0.12; // m over the eyes: the middle of the light on the wall
 const POOL = 0.45; // m from there to where half of the light is gone
 const PUDDLE = 1.3; // m around the feet to where the light on the floor has faded to a third
 const FLOOR = [0.9, 0.3] as const; // of the wall's colour beside that light, and how much of the wall's light the feet get
-/** Of a room: the wall where its light is, and far from there; display values. */
-const ROOMS: Record<'dark' | 'bright', Record<'lit' | 'unlit', readonly [number, number, number]>> = {
-  dark: { lit: [0.42, 0.37, 0.335], unlit: [0.105, 0.09, 0.08] },
-  bright: { lit: [0.96, 0.935, 0.9], unlit: [0.71, 0.675, 0.635] },
+/** Of a room: the wall where its light is, and far from there, and what a window's light adds; display values. */
+const ROOMS: Record<'dark' | 'bright', Record<'lit' | 'unlit' | 'sun', readonly [number, number, number]>> = {
+  dark: { lit: [0.42, 0.37, 0.335], unlit: [0.105, 0.09, 0.08], sun: [0.2, 0.145, 0.08] },
+  bright: { lit: [0.945, 0.92, 0.885], unlit: [0.69, 0.655, 0.62], sun: [0.15, 0.115, 0.06] },
 };
 /**
  * How much of the room's colour is behind a person, and behind a head alone; the rest is the colour on which they
@@ -30,8 +31,8 @@ interface Uniforms {
 }
 
 /**
- * A room behind all Gaussians: a wall in the light of a lamp that falls off around whoever stands before it, a
- * floor that goes over into the wall, and a soft shadow under the feet.
+ * A room behind all Gaussians: a wall in the light of a lamp that falls off around whoever stands before it, with
+ * that of a window beside them, a floor that goes over into the wall, and a soft shadow under the feet.
  */
 export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMaterial> implements Backcloth {
   version = 0;
@@ -47,6 +48,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       clipToWorld: { value: new THREE.Matrix4() },
       lit: { value: new THREE.Vector3() },
       unlit: { value: new THREE.Vector3() },
+      sun: { value: new THREE.Vector3() },
       lamp: { value: new THREE.Vector3() },
       foot: { value: new THREE.Vector3() },
       up: { value: new THREE.Vector3(0, 1, 0) },
@@ -146,10 +148,12 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
   }
 
   private paint(): void {
-    const { lit, unlit } = ROOMS[this.bright ? 'bright' : 'dark'];
+    const { lit, unlit, sun } = ROOMS[this.bright ? 'bright' : 'dark'];
     const { uniforms } = this.material;
     uniforms.lit!.value.copy(this.own).lerp(COLOUR.set(...lit), this.share);
     uniforms.unlit!.value.copy(this.own).lerp(COLOUR.set(...unlit), Math.sqrt(this.share)); // nobody's edges are there
+    const beside = uniforms.depth!.value; // a head alone might have it in its edges
+    uniforms.sun!.value.set(...sun).multiplyScalar(beside);
     this.version++;
   }
 
@@ -160,7 +164,8 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
 
   /** The same as the shader, for pictures that are drawn without. */
   colour(eye: THREE.Vector3, way: THREE.Vector3, out: Float32Array, at: number): void {
-    const { lit, unlit, lamp, foot, up, front } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const { lit, unlit, sun, lamp, foot, up, front } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const shines = windowLight(eye, way, { foot: foot!.value, up: up!.value, front: front!.value });
     const glow = glowOf(PLACE.copy(lamp!.value).sub(eye), way);
     const rise = way.dot(up!.value);
     const height = SIDE.copy(eye).sub(foot!.value).dot(up!.value);
@@ -173,7 +178,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     }
     for (let channel = 0; channel < 3; channel++) {
       const light = lit!.value.getComponent(channel);
-      const colour = mix(unlit!.value.getComponent(channel), light, glow);
+      const colour = mix(unlit!.value.getComponent(channel), light, glow) + shines * sun!.value.getComponent(channel);
       out[at + channel] = mix(mix(FLOOR[0] * colour, light, puddle), colour, wall) * shade;
     }
   }
@@ -243,12 +248,13 @@ const number = (value: number) => value.toFixed(4); // as GLSL reads one
 
 // Colours are display values, as Gaussians are blended; noise of half a level hides the steps between them.
 const FRAGMENT = `
-  uniform vec3 lit, unlit, lamp, foot, under, up, front;
+  uniform vec3 lit, unlit, sun, lamp, foot, under, up, front;
   uniform vec3 soles[2];
   uniform vec2 shadow, sizes[2];
   uniform float depth, alone;
   varying vec3 ray;
 
+  ${WINDOW_LIGHT}
   float glowOf(vec3 toLamp, vec3 way) {
     float distance = length(toLamp);
     float cosine = dot(way, toLamp) / distance;
@@ -275,7 +281,7 @@ const FRAGMENT = `
   void main() {
     vec3 way = normalize(ray);
     float rise = dot(way, up);
-    vec3 colour = mix(unlit, lit, glowOf(lamp - cameraPosition, way));
+    vec3 colour = mix(unlit, lit, glowOf(lamp - cameraPosition, way)) + sun * windowLight(cameraPosition, way, foot, up, front);
     float dark = 0.0;
     float height = dot(cameraPosition - foot, up);
     if (height > 0.0 && rise < -1e-4) {

@@ -27,8 +27,19 @@ describe.each([
 ])('%s', (_, bright) => {
   test('has the light of a lamp around the head, which falls off at every distance', () => {
     const { luminance } = room(bright);
-    const along = [0.1, 0.25, 0.5, 1, 2].map((aside) => luminance(aside, 0));
+    const along = [0.1, 0.25, 0.5, 1, 2].map((aside) => luminance(-aside, 0));
     for (const [i, value] of along.slice(1).entries()) expect(along[i]! - value).toBeGreaterThan(0.02);
+  });
+
+  test('has the light of a window on the wall to the left of whoever stands there, between bars', () => {
+    const { luminance } = room(bright);
+    const row = Array.from({ length: 60 }, (_, i) => luminance(0.1 + 0.015 * i, 0.05) - luminance(-0.1 - 0.015 * i, 0.05));
+    const bars = row.slice(2).filter((value, i) => row[i + 1]! < value - 1e-6 && row[i + 1]! <= row[i]! && Math.max(...row) - row[i + 1]! > 0.05);
+    expect(Math.max(...row)).toBeGreaterThan(0.1);
+    expect(bars.length).toBeGreaterThanOrEqual(2);
+    expect(row.at(-1)).toBeCloseTo(0, 2);
+    const alone = room(bright, false);
+    for (let i = 0; i < 60; i++) expect(alone.luminance(0.1 + 0.015 * i, 0.05)).toBeCloseTo(alone.luminance(-0.1 - 0.015 * i, 0.05), 6);
   });
 
   test('is warm, unlike the cloth before which people are recorded', () => {

@@ -84,9 +84,11 @@ describe('who sits before the camera', () => {
   });
 
   test('whoever turns the head is met a little from the left', () => {
-    const { toward } = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1], true);
+    const { toward, eyes } = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1], true);
     const angle = (24 * Math.PI) / 180;
     expect(toward.toArray()).toEqual([expect.closeTo(Math.sin(angle), 6), 0, expect.closeTo(Math.cos(angle), 6)]);
+    const turned = eyes.clone().sub(whole.eyes).toArray(); // about the neck
+    expect(turned).toEqual([expect.closeTo(0.09 * Math.sin(angle), 6), 0, expect.closeTo(0.09 * (Math.cos(angle) - 1), 6)]);
   });
 
   test('their extent is that of head and body', () => {

@@ -18,6 +18,7 @@ const SEEN = 0.3; // opacity from which a Gaussian counts
 const STRAYS = 0.01; // share of a head's Gaussians, at either end, that may lie anywhere
 const CROWNS = [0.09, 0.25] as const; // m: from a shaved head to the highest hair
 const ASIDE = THREE.MathUtils.degToRad(24); // to the left of somebody who turns the head: people hardly ever stand square to each other
+const NECK = 0.09; // m from the axis about which a head turns to between the eyes
 const LEVEL = 0.5; // of a direction's length: what is steeper does not say where somebody looks
 
 /**
@@ -44,7 +45,10 @@ export function sitterOf(
   const start = new THREE.Vector3(...camera.eye);
   const recorded = start.clone().sub(body ? new THREE.Vector3(...camera.target) : eyes).normalize();
   const toward = body ? (level(forward, up) ?? level(recorded, up) ?? recorded) : recorded;
-  if (turns) toward.applyAxisAngle(up, ASIDE);
+  if (turns) {
+    eyes.addScaledVector(toward, -NECK);
+    eyes.addScaledVector(toward.applyAxisAngle(up, ASIDE), NECK);
+  }
   const points = visiblePoints(files, rows[0]!);
   const heights = points.map((point) => point.clone().sub(eyes).dot(up)).sort((a, b) => a - b);
   const box = new THREE.Box3().setFromPoints(withoutStrays(points));
