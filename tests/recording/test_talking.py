@@ -10,6 +10,7 @@ import pytest
 
 from ico3d.chat.serving.sites import Sites
 from ico3d.recording import app as server
+from ico3d.recording.making.makers import Bodies
 from support.needs import needs
 
 pytestmark = [needs("av"), pytest.mark.slow]
@@ -27,10 +28,13 @@ async def test_others_are_answered_while_talks_begin(room, monkeypatch):
         room.people.begin(name, "de", True, date.today())
     begun = threading.Event()
     starting = SimpleNamespace(url=lambda: "there" if begun.wait(20) else "")
-    monkeypatch.setattr(room.talks, "begin", lambda _: starting)
+    asked_for = []
+    monkeypatch.setattr(room.talks, "begin", lambda file: asked_for.append(file.stem) or starting)
     sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
     async with httpx.AsyncClient(transport=sending, base_url=HOME) as client:
-        asked = [f"/recordings/{name}/talk" for name in ("Ida", "Ada") * 32]  # more than threads
+        asked = [
+            f"/recordings/{name}/talk" for name in ("Ida", "Ada", "Ada%20") * 20
+        ]  # more than threads
         talks = [asyncio.create_task(client.post(path)) for path in asked]
         await asyncio.sleep(0.2)
         shown = await asyncio.wait_for(client.get("/recordings/"), 5)
@@ -39,6 +43,23 @@ async def test_others_are_answered_while_talks_begin(room, monkeypatch):
         assert gone.status_code == 204
         begun.set()
         assert {(await talk).text for talk in talks} == {'{"url":"there"}'}
+    assert asked_for == ["Ida", "Ada"]  # once each, however their names are spelt
+
+
+async def test_others_are_answered_while_looks_of_a_body_are_looked_up(room, monkeypatch):
+    people = [room.people.begin(f"Ida {n}", "de", True, date.today()).name for n in range(16)]
+    found = threading.Event()
+    monkeypatch.setattr(Bodies, "check", lambda *_: found.wait(20))
+    sending = httpx.ASGITransport(server.make_app(room, "127.0.0.1", Sites()))
+    choice = {"wanted": True, "build": "slender", "outfit": "wine"}
+    async with httpx.AsyncClient(transport=sending, base_url=HOME) as client:
+        asked = [client.put(f"/recordings/{name}/body", json=choice) for name in people]
+        chosen = [asyncio.create_task(one) for one in asked]
+        await asyncio.sleep(0.2)
+        shown = await asyncio.wait_for(client.get("/recordings/Ida 1"), 5)
+        assert shown.json()["name"] == "Ida 1" and not any(one.done() for one in chosen)
+        found.set()
+        assert {(await one).status_code for one in chosen} == {200}
 
 
 async def test_no_talk_begins_of_somebody_who_was_deleted_meanwhile(room, monkeypatch):

@@ -248,14 +248,15 @@ def _add_parts(app: FastAPI, room: Room) -> None:
 def _add_making(app: FastAPI, room: Room) -> None:
     """The making of an avatar, its progress, and the talk at its end."""
     making = ROOT + "{name}/making"
-    beginning = FairQueue(1)  # of talks: each holds a thread for seconds, and all others need some
+    checking, beginning = FairQueue(1), FairQueue(1)  # threads for seconds, which others need, too
 
     @app.put(ROOT + "{name}/body")
     async def choose(name: str, request: Request) -> Response:
-        choice = chosen(await _form(request))
+        choice, whose = chosen(await _form(request)), room.people.person(name).name
+        check = partial(asyncio.to_thread, room.bodies.check, choice)
+        await while_there(request, checking.done(whose, choice, check))
         async with room.lock(name):
-            person = room.people.person(name)
-            await asyncio.to_thread(room.bodies.check, choice)
+            person = room.people.person(name)  # may be deleted by now
             await asyncio.to_thread(write_choice, person.folder, choice)
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
@@ -287,13 +288,17 @@ def _add_making(app: FastAPI, room: Room) -> None:
 
     @app.post(ROOT + "{name}/talk")
     async def talk(name: str, request: Request) -> Response:
+        whose = room.people.person(name).name  # however it is spelt in the address
+
         async def begin() -> str:
             async with room.lock(name):
                 avatar = Places(room.people.person(name).folder).avatar
                 talk = await asyncio.to_thread(room.talks.begin, avatar)
             return await asyncio.to_thread(talk.url)  # whoever deletes it meanwhile ends it
 
-        return JSONResponse({"url": await while_there(request, beginning.done(name, name, begin))})
+        return JSONResponse(
+            {"url": await while_there(request, beginning.done(whose, whose, begin))}
+        )
 
 
 def _status(room: Room, person: Person) -> dict[str, Any]:

@@ -49,7 +49,6 @@ class Bodies:
     default: BodyChoice = HEAD_ALONE
     _faults: dict[Look, str] = field(default_factory=dict, init=False, compare=False)
     """What was found about a look; nothing where the body can have it."""
-    _finding: threading.Lock = field(default_factory=threading.Lock, init=False, compare=False)
 
     @property
     def is_packaged(self) -> bool:
@@ -68,9 +67,8 @@ class Bodies:
         """
         if not choice.wanted or self.is_packaged:
             return
-        with self._finding:  # opening the body takes a second, and who asks may ask again and again
-            if choice.look not in self._faults:
-                self._faults[choice.look] = self._fault(choice.look)
+        if choice.look not in self._faults:  # it takes a second, and who asks may ask again
+            self._faults[choice.look] = self._fault(choice.look)
         if fault := self._faults[choice.look]:
             raise BundleError(fault)
 
