@@ -1,7 +1,10 @@
 """Who asks often that a part be kept, or does not wait for it, holds up nobody else."""
 
 import asyncio
+import contextlib
+import os
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import httpx
@@ -65,6 +68,13 @@ async def _ask(port, name, take):
     writer.write(KEEP % (name, take))
     await writer.drain()
     return writer
+
+
+def _held():
+    """What this process has open."""
+    for link in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # that of this listing
+            yield os.readlink(link)
 
 
 async def _takes(port, name):
@@ -141,6 +151,27 @@ async def test_talks_that_nobody_waits_for_do_not_begin_and_hold_up_no_deletion(
     may_end.set()
     await asyncio.sleep(0.5)
     assert looks == [("talk", "Eve"), ("picture", b"url")]
+
+
+async def test_what_somebody_does_not_read_is_gone_when_it_is_deleted(server, tmp_path):
+    port, _, may_end = server
+    may_end.set()
+    keeping = await _ask(port, b"Bob", b"text-1/a0")
+    async with asyncio.timeout(30):
+        while (await _takes(port, "Bob")).get("text-1") != "kept":
+            await asyncio.sleep(0.05)
+    file = next((tmp_path / "people" / "Bob" / "parts").glob("text-1*.mp4"))
+    with file.open("ab") as part:
+        part.write(bytes(30_000_000))  # more than a connection holds
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(b"GET /recordings/Bob/parts/text-1 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    assert b"200" in await reader.readline()
+    await until(lambda: any("text-1" in name for name in _held()))
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=5) as client:
+        assert (await client.delete("/recordings/Bob")).status_code == 204
+    await until(lambda: not any("text-1" in name for name in _held()))
+    for open_one in (writer, keeping):
+        open_one.close()
 
 
 async def test_all_who_ask_for_one_part_are_told_that_it_is_kept(server):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, Request, Response
-from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
+from fastapi.responses import JSONResponse, RedirectResponse
 
 from ico3d.chat.serving.guard import Guard
 from ico3d.chat.serving.server import add_page
@@ -37,7 +37,7 @@ from ico3d.recording.making.places import Places
 from ico3d.recording.making.progress import shown_face
 from ico3d.recording.making.sources import Recorded
 from ico3d.recording.making.talks import Talks
-from ico3d.recording.presence import while_there
+from ico3d.recording.presence import Playing, while_there
 from ico3d.recording.refusals import Refused, full_disk
 
 ROOT = "/recordings/"
@@ -227,7 +227,7 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         if found is None:
             raise Refused("part", "this part is not recorded.", 404)
         kind, about = TYPES.get(found.file.suffix, "video/webm"), os.stat(found.file)
-        return FileResponse(found.file, media_type=kind, headers=NEVER_KEPT, stat_result=about)
+        return Playing(found.file, media_type=kind, headers=NEVER_KEPT, stat_result=about)
 
     @app.delete(part)
     async def remove(name: str, id: str) -> Response:

@@ -1,16 +1,22 @@
 """Whether a client still waits for its answer, of which routes are not told."""
 
 import asyncio
+import contextlib
+import os
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
 from starlette.requests import Request
+from starlette.responses import FileResponse
+from starlette.types import Receive, Scope, Send
 
 from ico3d.recording.refusals import Refused
 
 CLIENT_GONE = 499
 """Status of an answer that nobody waits for any more."""
 T = TypeVar("T")
+EVERY = 1.0
+"""Seconds between two looks whether a file that somebody is being sent is still there."""
 
 
 async def while_there(request: Request, work: Coroutine[Any, Any, T]) -> T:
@@ -37,3 +43,32 @@ async def while_there(request: Request, work: Coroutine[Any, Any, T]) -> T:
     finally:
         working.cancel()
         leaving.cancel()
+
+
+class Playing(FileResponse):
+    """Sends a file for as long as it is there.
+
+    What was removed would else stay on the disk, and be sent on, until a client has read it all.
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Sends it, or breaks off."""
+        sending = asyncio.create_task(super().__call__(scope, receive, send))
+        try:
+            while not sending.done() and self._is_there():
+                await asyncio.wait({sending}, timeout=EVERY)
+            if sending.done():
+                await sending
+        finally:
+            sending.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait({sending})
+
+    def _is_there(self) -> bool:
+        """Whether the file is still the one whose facts were told."""
+        try:
+            return self.stat_result is None or os.path.samestat(
+                os.stat(self.path), self.stat_result
+            )
+        except OSError:
+            return False

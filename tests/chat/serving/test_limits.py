@@ -8,7 +8,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
-from ico3d.chat.serving.limits import FORGIVEN, Inlet, SessionLimits
+from ico3d.chat.serving.limits import FORGIVEN, KEPT, Inlet, SessionLimits, seconds
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import (
     MICROPHONE_CHUNK,
@@ -135,6 +135,19 @@ def test_sound_at_several_times_real_time_is_a_flood(speed):
                 check(limits, chunk(0))
         broken += 1
     assert broken < 12
+
+
+def test_releasing_a_button_that_is_up_lets_no_backlog_pass():
+    """A minute of sound at once, with releases between, held up everybody for seconds."""
+    inlet, heard = Inlet(Time()), 0.0
+    for number in range(58):
+        messages = [chunk(number, 16000), Talk(False)]
+        due = [one for message in messages for one in inlet.admit(message)]
+        assert due[-1] == Talk(False)
+        heard += sum(seconds(one) for one in due if isinstance(one, Audio))
+    assert heard == 0.0
+    assert sum(map(seconds, inlet.rest())) == KEPT
+    assert [type(one) for one in inlet.admit(Talk(True))] == [Talk]
 
 
 def test_sound_in_time_is_heard_as_it_comes():

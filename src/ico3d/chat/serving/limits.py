@@ -96,12 +96,14 @@ class Inlet:
         self._now, self._at = now, now()
         self._balance = BACKLOG  # s of sound that may still come at once; below 0 in a backlog
         self._waiting: deque[Audio] = deque()
+        self._pressed = False
 
     def admit(self, message: ClientMessage) -> list[ClientMessage]:
         """Takes a message on arrival; returns the messages to handle now, in order."""
         if isinstance(message, Audio):
             return [*self.take(message)]
-        if isinstance(message, Talk):
+        if isinstance(message, Talk) and message.pressed is not self._pressed:
+            self._pressed = message.pressed
             return [*self.rest(), message]  # sound that waits belongs to the button's last state
         return [message]
 

@@ -1,5 +1,6 @@
 """The processor that prevents the avatar from hearing its own voice."""
 
+import asyncio
 from dataclasses import replace
 
 import numpy as np
@@ -25,4 +26,5 @@ class EchoFilter(FrameProcessor):
             pcm = np.frombuffer(frame.audio, np.int16)
             if self._guard.is_echo(pcm, frame.playing, frame.position):
                 frame = replace(frame, audio=bytes(len(frame.audio)))
+            await asyncio.sleep(0)  # a second of sound took 9 ms, and a minute may come at once
         await self.push_frame(frame, direction)
