@@ -17,7 +17,7 @@ export interface Sitter {
 const SEEN = 0.3; // opacity from which a Gaussian counts
 const STRAYS = 0.01; // share of a head's Gaussians, at either end, that may lie anywhere
 const CROWNS = [0.09, 0.25] as const; // m: from a shaved head to the highest hair
-const ASIDE = THREE.MathUtils.degToRad(24); // to the left of somebody who turns the head: people hardly ever stand square to each other
+const ASIDE = THREE.MathUtils.degToRad(-18); // to the right of somebody who turns the head: people hardly ever stand square to each other
 const NECK = 0.09; // m from the axis about which a head turns to between the eyes
 const LEVEL = 0.5; // of a direction's length: what is steeper does not say where somebody looks
 
