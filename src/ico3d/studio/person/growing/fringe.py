@@ -15,7 +15,7 @@ WIDEST = np.radians(74.0)
 """How far from the middle it begins."""
 THIN = 0.25
 """Logarithm of how much brighter a fringe is than other hair: light goes through it."""
-HANGING = -0.9
+HANGING = -0.7
 """Locks darker than others by this, in deviations, hang before the ear, few as they are; all others
 are combed back over it."""
 DEEPEST = 0.026
@@ -50,7 +50,7 @@ def curtain(skull: Skull, roots: np.ndarray, random: np.random.Generator) -> Pat
     t = np.linspace(0, 1, POINTS)
     swept = _swept(of_lock)
     full = 0.004 + 0.0075 * np.sin(np.pi * np.minimum(1, 1.15 * t) ** 0.8) ** 1.2
-    full = np.where(swept[:, None], 0.8 - 0.35 * t, 1.0) * full
+    full = np.where(swept[:, None], 0.85 - 0.2 * t, 1.0) * full
     flick = np.where(swept, 0.0, 0.007 + 0.005 * of_lock[:, 2])[:, None] * t**4
     lift = skull.scale * (full * (0.35 + 0.65 * level[:, None]) * (1 - np.exp(-9 * t)) + flick)
     above = np.linalg.norm(roots - skull.centre, axis=1) - skull.radius(start)  # (N,)
