@@ -26,11 +26,8 @@ LOOK = b"POST /recordings/Eve/look HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length
 
 
 @pytest.fixture
-async def server(tmp_path, monkeypatch):
-    """The port of a server, the looks that have begun, and what lets them end.
-
-    Eve has eight takes, Bob has one.
-    """
+def room(tmp_path, monkeypatch):
+    """Recordings of Eve, who has eight takes, and of Bob, who has one."""
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     folder, data = tmp_path / "people", part_file(tmp_path / "a.mp4").read_bytes()
     room = studio.open_room(folder, "127.0.0.1", False)
@@ -38,6 +35,12 @@ async def server(tmp_path, monkeypatch):
         person = begun(folder, name)
         for n in range(takes):
             person.append(f"text-{n % 2 + 1}", f"a{n}", 0, data)
+    return room
+
+
+@pytest.fixture
+async def server(room, monkeypatch):
+    """The port of a server, the looks that have begun, and what lets them end."""
     looks, may_end = [], asyncio.Event()
 
     async def report(file, id):
@@ -183,3 +186,37 @@ async def test_all_who_ask_for_one_part_are_told_that_it_is_kept(server):
         may_end.set()
         answers = await asyncio.gather(*asked)
     assert [one.status_code for one in answers] == [200] * 5 and len(looks) == 1
+
+
+async def test_parts_that_wait_to_be_kept_hold_up_no_other_look(server, room):
+    port, looks, may_end = server
+    may_end.set()
+    async with room.lock("Eve"):  # as a hundred makings and stops hold it in turn
+        asked = [await _ask(port, b"Eve", b"text-%d/a%d" % (n % 2 + 1, n)) for n in range(4)]
+        await until(lambda: len(looks) == 4)
+        url = f"http://127.0.0.1:{port}/recordings/Bob/takes/text-1/a0/keep"
+        async with httpx.AsyncClient(timeout=20) as client:
+            assert (await client.post(url)).status_code == 200
+    async with asyncio.timeout(30):
+        while await _takes(port, "Eve") != {"text-1": "kept", "text-2": "kept"}:
+            await asyncio.sleep(0.05)
+    for writer in asked:
+        writer.close()
+
+
+async def test_a_body_without_an_end_is_not_read_while_a_part_is_looked_at(server):
+    port, looks, _ = server
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(KEEP.replace(b"Length: 0", b"Length: 99999999") % (b"Bob", b"text-1/a0"))
+    await until(lambda: len(looks) == 1)
+    writer.write(bytes(100_000))
+    assert b"413" in await asyncio.wait_for(reader.readline(), 10)
+    with contextlib.suppress(ConnectionError):
+        async with asyncio.timeout(20):
+            while await reader.read(1 << 16):
+                pass  # until it is closed
+            for _ in range(200):
+                writer.write(bytes(1 << 16))
+                await writer.drain()
+            pytest.fail("a body that was refused is read on")
+    writer.close()

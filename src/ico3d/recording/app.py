@@ -181,8 +181,8 @@ def _add_people(app: FastAPI, room: Room) -> None:
         person = room.people.person(name)
         async with room.lock(name):
             await asyncio.to_thread(room.makers.stop, person)
-            await asyncio.to_thread(room.talks.stop, person.name)
             await asyncio.to_thread(room.people.delete, person.name)
+            await asyncio.to_thread(room.talks.stop, person.name)  # none begins without a file
             await asyncio.to_thread(room.looks.end, person.folder)
         return Response(status_code=204)
 
@@ -207,18 +207,20 @@ def _add_parts(app: FastAPI, room: Room) -> None:
         person = room.people.person(name)
         file = person.unfinished(id, take)
 
-        async def look_and_keep() -> None:
+        async def look_at_it() -> Any:
             try:
-                report = await room.looks.report(file, id)
+                return await room.looks.report(file, id)
             except Refused as error:
                 if error.code in ("no-video", "costly", "unusable"):
                     person.discard(id, take)
                 raise
+
+        async def keep_it(report: Any) -> None:
             async with room.lock(name):
                 room.people.person(name)  # may be deleted by now
                 await asyncio.to_thread(person.keep, id, take, report)
 
-        await while_there(request, room.queue.done(person.name, file, look_and_keep))
+        await while_there(request, room.queue.done(person.name, file, look_at_it, keep_it))
         return JSONResponse(await asyncio.to_thread(_status, room, person))
 
     @app.get(part)
@@ -291,9 +293,8 @@ def _add_making(app: FastAPI, room: Room) -> None:
         whose = room.people.person(name).name  # however it is spelt in the address
 
         async def begin() -> str:
-            async with room.lock(name):
-                avatar = Places(room.people.person(name).folder).avatar
-                talk = await asyncio.to_thread(room.talks.begin, avatar)
+            avatar = Places(room.people.person(name).folder).avatar
+            talk = await asyncio.to_thread(room.talks.begin, avatar)
             return await asyncio.to_thread(talk.url)  # whoever deletes it meanwhile ends it
 
         return JSONResponse(

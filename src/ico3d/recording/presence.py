@@ -14,6 +14,8 @@ from ico3d.recording.refusals import Refused
 
 CLIENT_GONE = 499
 """Status of an answer that nobody waits for any more."""
+UNASKED = 4096
+"""Bytes that a client may send of a body that nobody reads."""
 T = TypeVar("T")
 EVERY = 1.0
 """Seconds between two looks whether a file that somebody is being sent is still there."""
@@ -23,22 +25,26 @@ async def while_there(request: Request, work: Coroutine[Any, Any, T]) -> T:
     """What work comes to, for as long as the client of a request waits for it.
 
     Args:
-        request: Whose body is of no interest.
-        work: Is cancelled once the client has left.
+        request: Whose body is of no interest, or was read.
+        work: Is cancelled once the client has left, or sends more than `UNASKED` bytes.
 
     Raises:
-        Refused: If the client left first.
+        Refused: If the client did so first.
     """
 
-    async def leaves() -> None:
-        while (await request.receive())["type"] != "http.disconnect":
-            pass
+    async def leaves() -> Refused:
+        sent = 0
+        while (message := await request.receive())["type"] != "http.disconnect":
+            sent += len(message.get("body", b""))
+            if sent > UNASKED:
+                return Refused("large", "this is more than is taken at once.", 413)
+        return Refused("left", "nobody waits for this any more.", CLIENT_GONE)
 
     working, leaving = asyncio.create_task(work), asyncio.create_task(leaves())
     try:
         await asyncio.wait((working, leaving), return_when=asyncio.FIRST_COMPLETED)
         if not working.done():
-            raise Refused("left", "nobody waits for this any more.", CLIENT_GONE)
+            raise await leaving
         return await working
     finally:
         working.cancel()

@@ -94,3 +94,35 @@ async def test_as_much_is_done_at_a_time_as_there_are_places():
     await worker.end("b")
     assert worker.begun == ["a", "b", "c"]
     await worker.end(*"acd")
+
+
+async def test_what_follows_a_piece_needs_no_place_and_is_waited_for():
+    queue, may_follow, followed = FairQueue(1), asyncio.Event(), []
+
+    async def seven():
+        return 7
+
+    async def follow(found):
+        await may_follow.wait()
+        followed.append(found)
+        return found + 1
+
+    first = asyncio.create_task(queue.done("Eve", "a", seven, follow))
+    await settled()
+    assert await queue.done("Bob", "b", seven) == 7 and not first.done()
+    joined = asyncio.create_task(queue.done("Eve", "a", seven, follow))
+    await settled()
+    first.cancel()
+    may_follow.set()
+    assert await joined == 8 and followed == [7]
+
+
+async def test_what_goes_wrong_afterwards_is_told():
+    async def work():
+        return None
+
+    async def wrong(_):
+        raise ValueError("then")
+
+    with pytest.raises(ValueError, match="then"):
+        await FairQueue(1).done("Eve", "a", work, wrong)

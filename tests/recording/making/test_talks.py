@@ -7,6 +7,7 @@ import time
 
 import pytest
 
+from ico3d.recording import beside
 from ico3d.recording.making import talks
 from ico3d.recording.making.talks import Talks
 from ico3d.recording.refusals import Refused
@@ -80,6 +81,21 @@ def test_while_one_starts_others_begin_and_end_and_it_can_be_ended(avatar):
     assert starting.process.poll() is not None
     with pytest.raises(Refused, match="cannot talk"):
         starting.url()
+
+
+def test_no_talk_stays_of_an_avatar_that_was_deleted_as_it_began(avatar, monkeypatch):
+    started = []
+
+    def start(*words):
+        avatar.unlink()  # and whoever does so has stopped its talk before this one is known
+        started.append(beside.start(*words))
+        return started[0]
+
+    monkeypatch.setattr(talks, "start", start)
+    serving = Talks("127.0.0.1", False)
+    with pytest.raises(Refused, match="not made"):
+        serving.begin(avatar)
+    assert not serving._running and started[0].poll() is not None
 
 
 def test_a_name_is_no_address(avatar):

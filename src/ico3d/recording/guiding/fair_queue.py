@@ -11,6 +11,12 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+R = TypeVar("R")
+
+
+async def _nothing(found: T) -> T:
+    """Leaves it at that."""
+    return found
 
 
 @dataclass(eq=False)
@@ -21,13 +27,15 @@ class _Piece:
         whose: Who asked for it.
         key: What it is.
         work: Does it.
-        result: What the work came to; fails as it did.
+        then: Follows it, with what it came to, and makes the result of that.
+        result: What both came to; fails as they did.
         askers: How many wait for it.
     """
 
     whose: str
     key: Hashable
     work: Callable[[], Awaitable[Any]]
+    then: Callable[[Any], Awaitable[Any]]
     result: asyncio.Future[Any]
     askers: int = 0
 
@@ -43,21 +51,28 @@ class FairQueue:
         """Pieces that have not begun, by person; whose turn is next comes first."""
         self._tasks: set[asyncio.Task[None]] = set()
 
-    async def done(self, whose: str, key: Hashable, work: Callable[[], Awaitable[T]]) -> T:
+    async def done(
+        self,
+        whose: str,
+        key: Hashable,
+        work: Callable[[], Awaitable[T]],
+        then: Callable[[T], Awaitable[R]] = _nothing,
+    ) -> R:
         """What a piece of work comes to, once it is done.
 
         If all who wait for it are cancelled before it has begun, it is not done; else it is done to
-        its end.
+        its end, and so is what follows.
 
         Args:
             whose: Who asks for it.
             key: What it is: if it waits or is being done already, that is joined.
             work: Does it.
+            then: Follows, without a place: it may wait long for something else.
 
         Raises:
-            Exception: Whatever the work raises.
+            Exception: Whatever the work raises, or what follows.
         """
-        piece = self._pieces.get(key) or self._add(whose, key, work)
+        piece = self._pieces.get(key) or self._add(whose, key, work, then)
         piece.askers += 1
         self._begin_next()
         try:
@@ -67,10 +82,16 @@ class FairQueue:
             if not piece.askers:
                 self._drop(piece)
 
-    def _add(self, whose: str, key: Hashable, work: Callable[[], Awaitable[Any]]) -> _Piece:
+    def _add(
+        self,
+        whose: str,
+        key: Hashable,
+        work: Callable[[], Awaitable[Any]],
+        then: Callable[[Any], Awaitable[Any]],
+    ) -> _Piece:
         result = asyncio.get_running_loop().create_future()
         result.add_done_callback(lambda done: done.cancelled() or done.exception())  # all left
-        self._pieces[key] = piece = _Piece(whose, key, work, result)
+        self._pieces[key] = piece = _Piece(whose, key, work, then, result)
         self._waiting.setdefault(whose, deque()).append(piece)
         return piece
 
@@ -97,11 +118,18 @@ class FairQueue:
 
     async def _do(self, piece: _Piece) -> None:
         try:
-            piece.result.set_result(await piece.work())
+            found = await self._in_its_place(piece)
+            piece.result.set_result(await piece.then(found))
         except Exception as error:
             piece.result.set_exception(error)
         finally:
             piece.result.cancel()  # unless it is done
             del self._pieces[piece.key]
+
+    async def _in_its_place(self, piece: _Piece) -> Any:
+        """What its work comes to; others have its place afterwards."""
+        try:
+            return await piece.work()
+        finally:
             self._free += 1
             self._begin_next()

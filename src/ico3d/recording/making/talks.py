@@ -36,8 +36,7 @@ class Talks:
         Raises:
             Refused: If the avatar is not made.
         """
-        if os.path.islink(avatar) or not os.path.isfile(avatar):
-            raise Refused("unmade", "the avatar is not made yet.", 409)
+        _check(avatar)
         with self._lock:
             talk = self._running.pop(avatar.stem, None)
             if talk is None or talk.process.poll() is not None:
@@ -47,6 +46,11 @@ class Talks:
             over = list(self._running)[:-MOST]
         for name in over:
             self.stop(name)
+        try:
+            _check(avatar)  # who deletes it stops talks afterwards: one of both sees the other
+        except Refused:
+            self.stop(avatar.stem)
+            raise
         return talk
 
     def stop(self, name: str) -> None:
@@ -60,6 +64,12 @@ class Talks:
         """Ends all servers."""
         for name in list(self._running):
             self.stop(name)
+
+
+def _check(avatar: Path) -> None:
+    """Raises `Refused` where an avatar is not there."""
+    if os.path.islink(avatar) or not os.path.isfile(avatar):
+        raise Refused("unmade", "the avatar is not made yet.", 409)
 
 
 class Talk:
