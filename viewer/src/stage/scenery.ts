@@ -1,7 +1,7 @@
 import * as THREE from 'three';
 import type { Backcloth } from '../soft/contract.ts';
 import { footprintOf, type Ground, type Patch } from './camera/ground.ts';
-import { windowLight, WINDOW_LIGHT } from './window-light.ts';
+import { number, windowLight, WINDOW_LIGHT } from './window-light.ts';
 
 const SHADOW = [0.3, 0.22] as const; // m to the side and to the front where it has faded to a third, until feet are known
 const SHADES = { far: 0.34, near: 0.08, sole: 0.5 } as const; // share of the light that is missing: around the feet, between them, under a sole
@@ -172,7 +172,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     let [puddle, wall, shade] = [0, 1, 1];
     if (height > 0 && rise < -1e-4) {
       const place = PLACE.copy(way).multiplyScalar(-height / rise).add(eye).sub(foot!.value);
-      wall = smoothstep(1.2, 5, place.length());
+      wall = THREE.MathUtils.smoothstep(place.length(), 1.2, 5);
       puddle = FLOOR[1] * Math.exp(-place.lengthSq() / PUDDLE ** 2);
       shade = 1 - this.shadowAt(place.add(foot!.value), up!.value, front!.value);
     }
@@ -229,11 +229,6 @@ function mix(from: number, to: number, share: number): number {
   return from + share * (to - from);
 }
 
-function smoothstep(low: number, high: number, value: number): number {
-  const share = Math.min(Math.max((value - low) / (high - low), 0), 1);
-  return share * share * (3 - 2 * share);
-}
-
 const VERTEX = `
   uniform mat4 clipToWorld;
   varying vec3 ray;
@@ -243,8 +238,6 @@ const VERTEX = `
     gl_Position = vec4(position.xy, 1.0, 1.0);
   }
 `;
-
-const number = (value: number) => value.toFixed(4); // as GLSL reads one
 
 // Colours are display values, as Gaussians are blended; noise of half a level hides the steps between them.
 const FRAGMENT = `

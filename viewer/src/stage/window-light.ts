@@ -1,4 +1,4 @@
-import type { Vector3 } from 'three';
+import { MathUtils, Vector3 } from 'three';
 
 const WALL = 2.4; // m around the feet
 const MIDDLE = [0.8, 1.66] as const; // m on the wall to the person's left from right behind, and over the floor
@@ -19,8 +19,8 @@ export interface Standing {
  * beside the head of who is seen from the front. The wall is round, so that it is behind people wherever one goes.
  */
 export function windowLight(eye: Vector3, way: Vector3, { foot, up, front }: Standing): number {
-  const side = up.clone().cross(front);
-  const from = eye.clone().sub(foot);
+  const side = SIDE.crossVectors(up, front);
+  const from = FROM.subVectors(eye, foot);
   const [x, z, fromX, fromZ] = [way.dot(side), way.dot(front), from.dot(side), from.dot(front)];
   const a = Math.max(x * x + z * z, 1e-4);
   const b = fromX * x + fromZ * z;
@@ -33,11 +33,13 @@ export function windowLight(eye: Vector3, way: Vector3, { foot, up, front }: Sta
 /** How much light passes three panes side by side at a place in m from their middle. */
 function panes(place: number, apart: number, half: number): number {
   const beside = Math.abs(place - apart * Math.min(Math.max(Math.round(place / apart), -1), 1)); // from the nearest's
-  const share = Math.min(Math.max((beside - half + SOFT) / (2 * SOFT), 0), 1);
-  return 1 - share * share * (3 - 2 * share);
+  return 1 - MathUtils.smoothstep(beside, half - SOFT, half + SOFT);
 }
 
-const number = (value: number) => value.toFixed(4); // as GLSL reads one
+const [SIDE, FROM] = [new Vector3(), new Vector3()];
+
+/** A number as GLSL reads one. */
+export const number = (value: number) => value.toFixed(4);
 
 /** The same as `windowLight`, for shaders. */
 export const WINDOW_LIGHT = `

@@ -1,3 +1,4 @@
+import { smooth } from '../../face/idle.ts';
 import type { Cue, Release } from '../../protocol.ts';
 import type { Clip } from '../clip.ts';
 
@@ -48,10 +49,4 @@ export function endOf({ marks }: Clip, release: number | null): number {
 export function weight(clip: Clip, cue: Cue, release: number | null, time: number): number {
   const rising = smooth((time - cue.begin) / Math.min(BLEND_IN, cue.stroke - cue.begin));
   return release === null ? rising : rising * smooth((endOf(clip, release) - time) / BLEND_OUT);
-}
-
-/** Smoothstep: 0 up to x = 0, 1 from x = 1, with slope 0 at both. */
-function smooth(x: number): number {
-  const part = Math.min(Math.max(x, 0), 1);
-  return part * part * (3 - 2 * part);
 }
