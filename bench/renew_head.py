@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 from demo.finishing import composed, write_person
+from demo.lighting import lit_head
 from make_demo import check
 
 from ico3d.avatar.baking import head_bundle
@@ -63,7 +64,7 @@ class Renewal:
         onnx, speech = head_bundle.speech_file(adaptor, trained.encoder)
         info = head_bundle.head_info(head, trained, idle, old.fps, old.num_poses, gaze)
         manifest = replace(bundle.manifest, head=info, speech=speech, loss=result.loss)
-        write_person(self.out, bundle, manifest, composed(head), body, {SPEECH: onnx})
+        write_person(self.out, bundle, manifest, lit_head(composed(head)), body, {SPEECH: onnx})
         check(self.out)
 
 

@@ -1,4 +1,4 @@
-"""What is done to the packaged avatar once she is baked: arms, clothes, colours, lids."""
+"""What is done to the packaged avatar once she is baked: arms, clothes, colours, light, lids."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from demo.lighting import lit_body, lit_head
 from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.embodying.surfaces import main_joints
 from ico3d.avatar.render_bundle import BakedAvatar
@@ -22,7 +23,7 @@ from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.common.expression import FACE_NAMES, LIDS, SPEECH_SIZE
 from ico3d.rig.rig import Rig
 
-RESTS = Rest(16, 17)
+RESTS = Rest(13, 14)
 """Frames of the body's recording in which she nods a little, with hanging arms."""
 SHOULDERS, ARM = 0.02, "shoulder01"
 """Metres by which each arm is moved inwards once she is baked, since builds leave the skeleton as
@@ -56,17 +57,20 @@ EVENED = 0.8
 AWAKE = 0.1
 """Share of the way that lids take as they close by which hers are wider open: those of the files
 hang low at rest, and people who saw her called her sleepy."""
-CALMER = 0.25
-"""Share of the way from rest to the widest smile by which she smiles less at rest: in the middle of
-what she recorded her lips begin to part over the teeth."""
+SQUINT = 0.12
+"""Share of the way that lids take as they close by which they do so in the widest smile: a smile of
+the mouth alone looks polite at best."""
+WARMER = 0.3
+"""Share of the way from rest to the widest smile by which she smiles at rest: people who saw her
+without took her for stern."""
 
 
 def write_finished(path: Path) -> None:
     """Finishes a bundle that was just baked: arms, clothes, skin and gestures of its body, lids."""
     bundle = Bundle.open(path)
     assert bundle.skinned is not None
-    body = evened(muted(tailored(narrower(bundle.skinned))))
-    head, gestures = composed(bundle.require_head()[0]), gesture_files(body, (), 1.0)
+    body = lit_body(evened(muted(tailored(narrower(bundle.skinned)))))
+    head, gestures = lit_head(composed(bundle.require_head()[0])), gesture_files(body, (), 1.0)
     write_person(path, bundle, bundle.manifest, head, body, gestures)
 
 
@@ -126,14 +130,15 @@ def evened(body: BakedSkinned) -> BakedSkinned:
 
 
 def composed(head: BakedHead) -> BakedHead:
-    """The head of somebody who speaks with lids that are `AWAKE`, and a smile `CALMER` at rest."""
+    """The head with lids that are `AWAKE`, which smiles a little at rest, and with its eyes."""
     lids, smile = [SPEECH_SIZE + lid for lid in LIDS], SPEECH_SIZE + FACE_NAMES.index("smile")
 
     def with_rest(weights: np.ndarray, biases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rest = biases - AWAKE * weights[lids].sum(0) - CALMER * weights[smile]
-        wider = weights.copy()
-        wider[smile] *= 1 + CALMER  # at its widest it is what it was
-        return wider, rest
+        lidded = weights[lids].sum(0)
+        smiling = weights[smile] + SQUINT * lidded
+        warmer = weights.copy()
+        warmer[smile] = (1 - WARMER) * smiling  # at its widest it is what it was
+        return warmer, biases - AWAKE * lidded + WARMER * smiling
 
     w1, b1 = with_rest(head.w1, head.b1)
     displacement_w1, displacement_b1 = with_rest(head.displacement_w1, head.displacement_b1)
