@@ -22,6 +22,9 @@ MOST_HEADERS = 200  # of a request, those behind its body included
 PIECES, SMALL = 200, 512
 """Small pieces that a request's body may have at once, and bytes of others that allow one more:
 each costs this process time, however small it is, and a chunk of one byte is a piece."""
+LEFT_OVER = 1 << 20
+"""Bytes of a body that may still come once its request is answered. Nobody wants them, so they are
+read as fast as they come; but some clients read an answer only behind all that they have sent."""
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 RATE, AT_ONCE = 32.0, 256.0
 """New connections of one machine in a second, and at once: a browser opens six for a page, and
@@ -48,7 +51,7 @@ _arrivals = Meters(RATE, AT_ONCE, time.monotonic)
 class PromptProtocol(HttpToolsProtocol):
     """HTTP on one connection, which is closed if a request's head takes too long or is too large.
 
-    So it is if a body comes in crumbs.
+    So it is if a body comes in crumbs, or does not end once its request is answered.
 
     Behind a request that is not answered yet, one more may wait: a client may be that quick. One
     machine may have so many connections open and no more. Those of proxies that the operator
@@ -146,6 +149,7 @@ class PromptProtocol(HttpToolsProtocol):
         self._stop_waiting()
         self._head_bytes = 0
         self._pieces_left = float(PIECES)
+        self._left_over = LEFT_OVER
         before = self.cycle
         super().on_headers_complete()
         self._first = before if self.pipeline else self.cycle
@@ -154,9 +158,14 @@ class PromptProtocol(HttpToolsProtocol):
         """A piece of a request's body has arrived, whether the request is answered or not.
 
         Raises:
-            ProtocolError: If the body comes in too many small ones; the connection is closed.
+            ProtocolError: If the body comes in too many small ones, or goes on for long behind the
+                answer; the connection is closed.
         """
         self._head_bytes = 0
+        if self.cycle is not None and self.cycle.response_complete:
+            self._left_over -= len(body)
+            if self._left_over < 0:
+                self._cut_off("a body behind its answer.")
         self._pieces_left = min(PIECES, self._pieces_left + len(body) / SMALL) - 1
         if self._pieces_left < 0:
             self._cut_off("a body in crumbs.")
