@@ -12,12 +12,20 @@ import httpx
 import numpy as np
 import openai
 import pytest
-from pipecat.frames.frames import ErrorFrame, LLMContextFrame, LLMTextFrame
+from pipecat.frames.frames import (
+    AggregatedTextFrame,
+    ErrorFrame,
+    LLMContextFrame,
+    LLMTextFrame,
+    TTSAudioRawFrame,
+)
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.remote import door
+from ico3d.chat.remote.headless import Spares
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.remote.recognition import read_wav
+from ico3d.chat.remote.voice import spoken
 from ico3d.chat.services.voice import espeak, lasting
 from ico3d.errors import ProtocolError
 from support.chat.remote import (
@@ -321,6 +329,32 @@ async def test_a_voice_without_end_is_ended(monkeypatch):
         answer = await http.post("v1/audio/speech", json=asked)
     assert answer.status_code == 502
     assert answer.json()["error"]["message"] == "its sound is much longer than the text."
+
+
+class Repeating(FrameProcessor):
+    """A voice that notes what it is to say at a time, and says a sample of it."""
+
+    def __init__(self, said):
+        super().__init__()
+        self._said = said
+
+    async def process_frame(self, frame, direction):
+        await super().process_frame(frame, direction)
+        assert not isinstance(frame, LLMTextFrame)  # a voice would look for its sentences itself
+        if isinstance(frame, AggregatedTextFrame):
+            self._said.append(frame.text)
+            await self.push_frame(TTSAudioRawFrame(b"ab", 24_000, 1))
+        await self.push_frame(frame, direction)
+
+
+async def test_a_voice_gets_a_long_text_in_sentences_which_have_an_end():
+    said = []
+    voices = Spares(lambda: Repeating(said))
+    text = f"{TEXT} " + "A." * 2000
+    sound = [pcm async for pcm in spoken(text, voices, 20)]
+    assert b"".join(sound) == b"ab" * len(said)
+    assert said[:2] == ["I am Ada.", "I live in a box."] and max(map(len, said)) <= 401
+    assert "".join(said[2:]) == "A." * 2000
 
 
 async def test_a_request_of_thousands_of_tools_or_messages_is_refused():

@@ -8,17 +8,19 @@ from typing import Literal
 from fastapi import FastAPI, Request
 from fastapi.responses import StreamingResponse
 from pipecat.frames.frames import (
+    AggregatedTextFrame,
     Frame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
-    LLMTextFrame,
     TTSAudioRawFrame,
 )
 from pipecat.services.tts_service import TTSService
+from pipecat.utils.text.base_text_aggregator import TextType
 from pydantic import BaseModel, Field
 
 from ico3d.chat.remote.asked import asked
 from ico3d.chat.remote.headless import Spares, run
+from ico3d.chat.services.voice.clauses import sentences_of
 from ico3d.chat.services.voice.lasting import bound_sound
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import ServiceError
@@ -68,11 +70,10 @@ async def spoken(text: str, spares: Spares, seconds: float) -> AsyncGenerator[by
         ServiceError: If the voice fails, or produces no sound or far too much.
         TimeoutError: If the time limit is exceeded.
     """
-    frames: list[Frame] = [
-        LLMFullResponseStartFrame(),
-        LLMTextFrame(text),
-        LLMFullResponseEndFrame(),
-    ]
+    frames: list[Frame] = [LLMFullResponseStartFrame()]
+    for sentence in await sentences_of(text):  # a voice would look at all of it for each letter
+        frames.append(AggregatedTextFrame(text=sentence, text_type=TextType.SENTENCE))
+    frames.append(LLMFullResponseEndFrame())
     silent, voice = True, await spares.take()
     if isinstance(voice, TTSService):
         bound_sound(voice)

@@ -1,5 +1,6 @@
 """How an answer is cut while it is being written."""
 
+import asyncio
 import time
 
 import pytest
@@ -20,7 +21,12 @@ from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
 from ico3d.bundle.persona import Persona
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import espeak
-from ico3d.chat.services.voice.clauses import MOST_LETTERS, ClauseProcessor, Clauses
+from ico3d.chat.services.voice.clauses import (
+    MOST_LETTERS,
+    ClauseProcessor,
+    Clauses,
+    sentences_of,
+)
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.common.espeak.speech import synthesize
 
@@ -189,3 +195,29 @@ async def test_an_answer_of_blanks_holds_nobody_up(blank):
     async for _ in clauses.aggregate(answer):
         pass
     assert time.process_time() - begun < 5  # it took minutes, in the loop of all visitors
+
+
+async def test_a_whole_text_is_cut_at_sentences_alone():
+    said = "Well then, you see, I am here. It is 3.5 km to Mr. Smith's, no more!\nBye"
+    assert await sentences_of(said) == [
+        "Well then, you see, I am here.",
+        "It is 3.5 km to Mr. Smith's, no more!",
+        "Bye",
+    ]
+    assert await sentences_of(" \n ") == []
+
+
+async def test_initials_without_end_leave_others_their_turns():
+    turns = 0
+
+    async def others():
+        nonlocal turns
+        while True:
+            await asyncio.sleep(0)
+            turns += 1
+
+    waiting = asyncio.create_task(others())
+    pieces = await sentences_of("A." * 2048)
+    waiting.cancel()
+    assert "".join(pieces) == "A." * 2048 and max(map(len, pieces)) <= MOST_LETTERS + 1
+    assert turns >= len(pieces) - 2 > 5

@@ -5,6 +5,7 @@ addresses and initials do not end one. In addition, the first piece of an answer
 clause, so that the voice can begin sooner, and a line break ends a piece.
 """
 
+import asyncio
 import re
 from collections.abc import AsyncIterator
 
@@ -64,10 +65,10 @@ class Clauses(SimpleTextAggregator):
         await super().reset()
         self._marks = self._spaces = 0
 
-    async def begin(self) -> None:
-        """Starts a new answer."""
+    async def begin(self, hurried: bool = True) -> None:
+        """Starts a new answer, whose first piece may end at a clause if it is `hurried`."""
         await self.reset()
-        self._first = True
+        self._first = hurried
 
     async def aggregate(self, text: str) -> AsyncIterator[Aggregation]:
         """Adds text of the answer; yields the pieces that are complete."""
@@ -168,6 +169,22 @@ class ClauseProcessor(LLMTextProcessor):
         if isinstance(frame, LLMFullResponseStartFrame):
             await self._clauses.begin()
         await super().process_frame(frame, direction)
+
+
+async def sentences_of(text: str, language: str | None = None) -> list[str]:
+    """The sentences of a text that is there as a whole; others get their turns meanwhile.
+
+    Args:
+        text: All of it.
+        language: Its language, a code such as `de`; by default English.
+    """
+    clauses, found = Clauses(language), list[str]()
+    await clauses.begin(hurried=False)
+    async for piece in clauses.aggregate(text):
+        found.append(piece.text)
+        await asyncio.sleep(0)
+    rest = await clauses.flush()
+    return [*found, rest.text] if rest else found
 
 
 def _letters(text: str) -> int:

@@ -22,9 +22,9 @@ MOST_HEADERS = 200  # of a request, those behind its body included
 PIECES, SMALL = 200, 512
 """Small pieces that a request's body may have at once, and bytes of others that allow one more:
 each costs this process time, however small it is, and a chunk of one byte is a piece."""
-LEFT_OVER = 1 << 20
-"""Bytes of a body that may still come once its request is answered. Nobody wants them, so they are
-read as fast as they come; but some clients read an answer only behind all that they have sent."""
+LEFT_OVER = float(16 << 20)
+"""Bytes in a second, of all connections, of bodies whose requests are answered. They would come as
+fast as they can be thrown away; but some clients read an answer only behind all they have sent."""
 MOST_OPEN = 128  # connections of one machine, WebSockets aside
 RATE, AT_ONCE = 32.0, 256.0
 """New connections of one machine in a second, and at once: a browser opens six for a page, and
@@ -48,10 +48,28 @@ _open: Counter[str] = Counter()
 _arrivals = Meters(RATE, AT_ONCE, time.monotonic)
 
 
+class _LeftOver:
+    """When there is time again for what comes behind answers, all connections together."""
+
+    def __init__(self) -> None:
+        self._until = 0.0
+
+    def add(self, size: int, now: float) -> None:
+        """Notes bytes that were thrown away."""
+        self._until = max(self._until, now) + size / LEFT_OVER
+
+    def wait(self, now: float) -> float:
+        """Seconds until then."""
+        return self._until - now
+
+
+_left_over = _LeftOver()
+
+
 class PromptProtocol(HttpToolsProtocol):
     """HTTP on one connection, which is closed if a request's head takes too long or is too large.
 
-    So it is if a body comes in crumbs, or does not end once its request is answered.
+    So it is if a body comes in crumbs, or goes on for `HEAD` seconds behind the answer.
 
     Behind a request that is not answered yet, one more may wait: a client may be that quick. One
     machine may have so many connections open and no more. Those of proxies that the operator
@@ -73,6 +91,7 @@ class PromptProtocol(HttpToolsProtocol):
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
+        self._pause: asyncio.TimerHandle | None = None  # of reading what comes behind an answer
         self._left = 0  # bytes of answers that had not been sent when that was last asked
         self._first: RequestResponseCycle | None = None  # that another one may wait for
         may = transport.get_extra_info("sslcontext") or may_arrive(self._machine)
@@ -84,6 +103,8 @@ class PromptProtocol(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forgets the connection; a request with another one behind it is told, too."""
         self._stop_waiting()
+        if self._pause is not None:
+            self._pause.cancel()
         self._uncount()
         if self._first is not None:
             self._first.disconnected = True
@@ -149,7 +170,6 @@ class PromptProtocol(HttpToolsProtocol):
         self._stop_waiting()
         self._head_bytes = 0
         self._pieces_left = float(PIECES)
-        self._left_over = LEFT_OVER
         before = self.cycle
         super().on_headers_complete()
         self._first = before if self.pipeline else self.cycle
@@ -158,14 +178,13 @@ class PromptProtocol(HttpToolsProtocol):
         """A piece of a request's body has arrived, whether the request is answered or not.
 
         Raises:
-            ProtocolError: If the body comes in too many small ones, or goes on for long behind the
-                answer; the connection is closed.
+            ProtocolError: If the body comes in too many small ones; the connection is closed.
         """
         self._head_bytes = 0
         if self.cycle is not None and self.cycle.response_complete:
-            self._left_over -= len(body)
-            if self._left_over < 0:
-                self._cut_off("a body behind its answer.")
+            _left_over.add(len(body), self.loop.time())
+            if self._pause is None:
+                self._read_on()
         self._pieces_left = min(PIECES, self._pieces_left + len(body) / SMALL) - 1
         if self._pieces_left < 0:
             self._cut_off("a body in crumbs.")
@@ -193,6 +212,16 @@ class PromptProtocol(HttpToolsProtocol):
             return
         self._uncount()
         super().handle_websocket_upgrade()
+
+    def _read_on(self) -> None:
+        """Reads what comes behind an answer as soon as there is time for it."""
+        self._pause = None
+        wait = _left_over.wait(self.loop.time())
+        if wait > 0:
+            self.flow.pause_reading()
+            self._pause = self.loop.call_later(wait, self._read_on)
+        elif self.cycle is None or self.cycle.response_complete:  # another request reads by itself
+            self.flow.resume_reading()
 
     def _await_head(self) -> None:
         self._stop_waiting()
