@@ -10,6 +10,7 @@ import resource
 import time
 from collections import Counter
 from typing import NoReturn
+from weakref import WeakKeyDictionary
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
@@ -49,21 +50,24 @@ _arrivals = Meters(RATE, AT_ONCE, time.monotonic)
 
 
 class _LeftOver:
-    """When there is time again for what comes behind answers, all connections together."""
+    """When there is time again for what comes behind answers, all connections of a loop together.
+
+    After a second without any there is time for as much as may come in a second.
+    """
 
     def __init__(self) -> None:
         self._until = 0.0
 
     def add(self, size: int, now: float) -> None:
         """Notes bytes that were thrown away."""
-        self._until = max(self._until, now) + size / LEFT_OVER
+        self._until = max(self._until, now - 1) + size / LEFT_OVER
 
     def wait(self, now: float) -> float:
         """Seconds until then."""
         return self._until - now
 
 
-_left_over = _LeftOver()
+_left_over = WeakKeyDictionary[asyncio.AbstractEventLoop, _LeftOver]()
 
 
 class PromptProtocol(HttpToolsProtocol):
@@ -91,6 +95,7 @@ class PromptProtocol(HttpToolsProtocol):
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
+        self._left_over = _left_over.setdefault(self.loop, _LeftOver())
         self._pause: asyncio.TimerHandle | None = None  # of reading what comes behind an answer
         self._left = 0  # bytes of answers that had not been sent when that was last asked
         self._first: RequestResponseCycle | None = None  # that another one may wait for
@@ -182,7 +187,7 @@ class PromptProtocol(HttpToolsProtocol):
         """
         self._head_bytes = 0
         if self.cycle is not None and self.cycle.response_complete:
-            _left_over.add(len(body), self.loop.time())
+            self._left_over.add(len(body), self.loop.time())
             if self._pause is None:
                 self._read_on()
         self._pieces_left = min(PIECES, self._pieces_left + len(body) / SMALL) - 1
@@ -216,7 +221,7 @@ class PromptProtocol(HttpToolsProtocol):
     def _read_on(self) -> None:
         """Reads what comes behind an answer as soon as there is time for it."""
         self._pause = None
-        wait = _left_over.wait(self.loop.time())
+        wait = self._left_over.wait(self.loop.time())
         if wait > 0:
             self.flow.pause_reading()
             self._pause = self.loop.call_later(wait, self._read_on)
