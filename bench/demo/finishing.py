@@ -66,7 +66,7 @@ without took her for stern."""
 
 
 def write_finished(path: Path) -> None:
-    """Finishes a bundle that was just baked: arms, clothes, skin and gestures of its body, lids."""
+    """Finishes a bundle that was just baked: arms, clothes, skin, light, gestures, and lids."""
     bundle = Bundle.open(path)
     assert bundle.skinned is not None
     body = lit_body(evened(muted(tailored(narrower(bundle.skinned)))))

@@ -10,9 +10,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ico3d.avatar.joining.normals import surface_normals
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.posing import harmonics
+from ico3d.common.spread import directions
 
 WINDOW = (-0.75, 0.45, 0.60)
 """Direction of the middle of the window from her: her right, up, and the front; of any length."""
@@ -28,6 +30,8 @@ lose: brighter skin would have no room left for its colour."""
 REACH, NEIGHBOURS, ROUNDS = 0.02, 64, 2
 """Metres and number of Gaussians within which a surface is taken for even, and how often directions
 are evened over them: hair would have one of its own on each strand, and wool showed stains."""
+DEEP = 0.05
+"""Metres from the median of a head's Gaussians, which are mostly in the face, to its inside."""
 REDDEST = 1.25
 """By how much the logit of red exceeds that of green in the head at most, as in 19 of 20 Gaussians:
 at temples under hair, light that went through skin glowed in the new shade."""
@@ -37,11 +41,7 @@ def lit_body(body: BakedSkinned) -> BakedSkinned:
     """The body in the window's light, in every pose."""
     constant, rest = _light()
     normals = body.normals / np.linalg.norm(body.normals.astype(np.float64), axis=1, keepdims=True)
-    near, weights = _neighbours(body.means.astype(np.float64), body.opacities / 255)
-    even = normals
-    for _ in range(ROUNDS):
-        same = np.maximum((even[near] * even[:, None]).sum(-1), 0)  # (N, K), not the other side
-        even = _mean(even[near], weights * same)
+    even = _evened(body.means.astype(np.float64), body.opacities / 255, normals)
     was = (harmonics(normals) - harmonics(even)) @ body.light  # (N, 3), lost with the old normals
     return replace(
         body,
@@ -57,14 +57,18 @@ def lit_head(head: BakedHead) -> BakedHead:
     logits = head.mean_logits.astype(np.float64)
     excess = np.maximum(logits[:, 0] - logits[:, 1] - REDDEST, 0)[:, None]  # (N, 1)
     logits[:, :3] += excess * (-0.3, 0.7, 0.5)
-    logits[:, :3] += constant + harmonics(_facing(head)) @ rest
+    opacities = 1 / (1 + np.exp(-logits[:, 3]))  # (N,)
+    means = head.means.astype(np.float64)
+    middle = np.median(means, axis=0) - (0, 0, DEEP)
+    facing = _evened(means, opacities, surface_normals(means, opacities, middle))
+    logits[:, :3] += constant + harmonics(facing) @ rest
     return replace(head, mean_logits=logits.astype(np.float16))
 
 
 def _light() -> tuple[np.ndarray, np.ndarray]:
     """What the light adds to logits: a constant (3,), and (8, 3) for `harmonics` of normals."""
     window = np.array(WINDOW) / np.linalg.norm(WINDOW)
-    normals = _sphere(2000)
+    normals = directions(2000)
     falling = np.maximum((normals @ window + AROUND) / (1 + AROUND), 0)  # (N,)
     added = np.log1p(STRENGTH * falling)[:, None] * TINT  # (N, 3)
     smooth = np.column_stack([np.ones(len(normals)), harmonics(normals)])  # (N, 9)
@@ -72,52 +76,18 @@ def _light() -> tuple[np.ndarray, np.ndarray]:
     return np.array(LIT) - (harmonics(window[None]) @ rest)[0], rest
 
 
-def _sphere(count: int) -> np.ndarray:
-    """(N, 3) unit vectors, spread evenly along a spiral."""
-    height = 1 - (2 * np.arange(count) + 1) / count  # (N,)
-    turn = np.pi * (1 + 5**0.5) * np.arange(count)  # (N,)
-    across = np.sqrt(1 - height**2)
-    return np.stack([across * np.cos(turn), height, across * np.sin(turn)], 1)
-
-
-def _facing(head: BakedHead) -> np.ndarray:
-    """(N, 3) unit vectors in which a head's surface faces at each Gaussian."""
-    points = head.means.astype(np.float64)
-    opacities = 1 / (1 + np.exp(-head.mean_logits[:, 3].astype(np.float64)))  # (N,)
-    near, weights = _neighbours(points, opacities)
-    offsets = points[near] - points[:, None]  # (N, K, 3)
-    middle = np.einsum("nk,nkd->nd", weights, offsets) / weights.sum(1, keepdims=True)
-    offsets = (offsets - middle[:, None]) * np.sqrt(weights)[..., None]
-    spread = np.einsum("nki,nkj->nij", offsets, offsets)  # (N, 3, 3)
-    normals = np.linalg.eigh(spread)[1][..., 0]  # (N, 3), along which the surface is thinnest
-    outwards = points - _axis(points)
-    normals *= np.where((normals * outwards).sum(1) < 0, -1.0, 1.0)[:, None]
-    for _ in range(ROUNDS):
-        normals = _mean(normals[near], weights)
-    return normals
-
-
-def _neighbours(points: np.ndarray, opacities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices (N, K) of the Gaussians about each, itself included, and weights (N, K).
+def _evened(points: np.ndarray, opacities: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N, 3) unit normals like those of their neighbours on the same side of a surface.
 
     Args:
         points: (N, 3) metres.
         opacities: (N,).
+        normals: (N, 3) unit vectors.
     """
     apart, near = KDTree(points).query(points, NEIGHBOURS)  # (N, K), (N, K)
-    falling = np.exp(-2 * (apart / REACH) ** 2) * (apart < REACH)  # (N, K)
-    return near, (opacities[near] + 1e-6) * falling
-
-
-def _mean(vectors: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(N, 3) unit vectors along the means of (N, K, 3), weighted by (N, K)."""
-    mean = np.einsum("nk,nkd->nd", weights, vectors)
-    return mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
-
-
-def _axis(points: np.ndarray) -> np.ndarray:
-    """(N, 3) the nearest points on a line upwards through the middle of a head of points (N, 3)."""
-    low, high = np.quantile(points[:, 1], (0.2, 0.8))
-    middle = np.median(points, axis=0) - (0, 0, 0.02)  # most Gaussians are in the face
-    height = np.clip(points[:, 1], low, high)
-    return np.stack([np.zeros_like(height), height, np.full_like(height, middle[2])], 1)
+    weights = (opacities[near] + 1e-6) * np.exp(-2 * (apart / REACH) ** 2) * (apart < REACH)
+    for _ in range(ROUNDS):
+        same = np.maximum((normals[near] * normals[:, None]).sum(-1), 0)  # (N, K)
+        mean = np.einsum("nk,nkd->nd", weights * same, normals[near])
+        normals = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
+    return normals

@@ -74,7 +74,7 @@ async def test_who_waits_for_one_person_keeps_no_talk_of_another_waiting(room, m
     assert [one.json()["url"] for one in answers] == ["Ida", "Ada"]
 
 
-async def test_a_talk_that_begins_while_its_person_is_deleted_is_stopped(room, monkeypatch):
+async def test_a_talk_is_stopped_once_the_files_of_its_person_are_gone(room, monkeypatch):
     room.people.begin("Ida", "de", True, date.today())
     done = []
     monkeypatch.setattr(room.talks, "stop", lambda name: done.append(("stop", name)))

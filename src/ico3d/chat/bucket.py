@@ -25,6 +25,12 @@ class Bucket:
             self._level -= amount
         return enough
 
+    def owe(self, amount: float) -> float:
+        """Takes an amount even if the bucket does not have it; returns the seconds until it has."""
+        self.has(amount)  # brings the level up to date
+        self._level -= amount
+        return max(0.0, -self._level / self._rate)
+
     def drain(self, amount: float) -> None:
         """Takes an amount even if the bucket does not have it, down to empty."""
         self.has(amount)  # brings the level up to date

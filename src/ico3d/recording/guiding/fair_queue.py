@@ -7,7 +7,7 @@ next.
 import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -36,7 +36,7 @@ class _Piece:
     key: Hashable
     work: Callable[[], Awaitable[Any]]
     then: Callable[[Any], Awaitable[Any]]
-    result: asyncio.Future[Any]
+    result: asyncio.Future[Any] = field(default_factory=asyncio.Future[Any])
     askers: int = 0
 
 
@@ -72,7 +72,7 @@ class FairQueue:
         Raises:
             Exception: Whatever the work raises, or what follows.
         """
-        piece = self._pieces.get(key) or self._add(whose, key, work, then)
+        piece = self._pieces.get(key) or self._add(_Piece(whose, key, work, then))
         piece.askers += 1
         self._begin_next()
         try:
@@ -82,17 +82,10 @@ class FairQueue:
             if not piece.askers:
                 self._drop(piece)
 
-    def _add(
-        self,
-        whose: str,
-        key: Hashable,
-        work: Callable[[], Awaitable[Any]],
-        then: Callable[[Any], Awaitable[Any]],
-    ) -> _Piece:
-        result = asyncio.get_running_loop().create_future()
-        result.add_done_callback(lambda done: done.cancelled() or done.exception())  # all left
-        self._pieces[key] = piece = _Piece(whose, key, work, then, result)
-        self._waiting.setdefault(whose, deque()).append(piece)
+    def _add(self, piece: _Piece) -> _Piece:
+        piece.result.add_done_callback(lambda it: it.cancelled() or it.exception())  # all left
+        self._pieces[piece.key] = piece
+        self._waiting.setdefault(piece.whose, deque()).append(piece)
         return piece
 
     def _drop(self, piece: _Piece) -> None:

@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
+from ico3d.chat.bucket import Bucket
 from ico3d.chat.serving.crowd import Meters, peer_of
 from ico3d.errors import ProtocolError
 
@@ -47,27 +48,7 @@ MOST_PARSED = 2048
 has time for each of them only if none costs more than a millisecond."""
 _open: Counter[str] = Counter()
 _arrivals = Meters(RATE, AT_ONCE, time.monotonic)
-
-
-class _LeftOver:
-    """When there is time again for what comes behind answers, all connections of a loop together.
-
-    After a second without any there is time for as much as may come in a second.
-    """
-
-    def __init__(self) -> None:
-        self._until = 0.0
-
-    def add(self, size: int, now: float) -> None:
-        """Notes bytes that were thrown away."""
-        self._until = max(self._until, now - 1) + size / LEFT_OVER
-
-    def wait(self, now: float) -> float:
-        """Seconds until then."""
-        return self._until - now
-
-
-_left_over = WeakKeyDictionary[asyncio.AbstractEventLoop, _LeftOver]()
+_left_over = WeakKeyDictionary[asyncio.AbstractEventLoop, Bucket]()
 
 
 class PromptProtocol(HttpToolsProtocol):
@@ -95,7 +76,8 @@ class PromptProtocol(HttpToolsProtocol):
         self._counted = True
         self._head_bytes = 0  # since anything else came: of a head, or of headers behind a body
         self._deadline: asyncio.TimerHandle | None = None
-        self._left_over = _left_over.setdefault(self.loop, _LeftOver())
+        allowed = Bucket(LEFT_OVER, LEFT_OVER, _running_time)
+        self._left_over = _left_over.setdefault(self.loop, allowed)
         self._pause: asyncio.TimerHandle | None = None  # of reading what comes behind an answer
         self._left = 0  # bytes of answers that had not been sent when that was last asked
         self._first: RequestResponseCycle | None = None  # that another one may wait for
@@ -187,9 +169,9 @@ class PromptProtocol(HttpToolsProtocol):
         """
         self._head_bytes = 0
         if self.cycle is not None and self.cycle.response_complete:
-            self._left_over.add(len(body), self.loop.time())
-            if self._pause is None:
-                self._read_on()
+            wait = self._left_over.owe(len(body))
+            if wait and self._pause is None:
+                self._pause_reading(wait)
         self._pieces_left = min(PIECES, self._pieces_left + len(body) / SMALL) - 1
         if self._pieces_left < 0:
             self._cut_off("a body in crumbs.")
@@ -218,13 +200,15 @@ class PromptProtocol(HttpToolsProtocol):
         self._uncount()
         super().handle_websocket_upgrade()
 
+    def _pause_reading(self, seconds: float) -> None:
+        self.flow.pause_reading()
+        self._pause = self.loop.call_later(seconds, self._read_on)
+
     def _read_on(self) -> None:
         """Reads what comes behind an answer as soon as there is time for it."""
         self._pause = None
-        wait = self._left_over.wait(self.loop.time())
-        if wait > 0:
-            self.flow.pause_reading()
-            self._pause = self.loop.call_later(wait, self._read_on)
+        if wait := self._left_over.owe(0):
+            self._pause_reading(wait)
         elif self.cycle is None or self.cycle.response_complete:  # another request reads by itself
             self.flow.resume_reading()
 
@@ -266,6 +250,11 @@ class PromptProtocol(HttpToolsProtocol):
 
 def _nothing() -> None:
     """Takes the place of what would have been told of a request that is dropped."""
+
+
+def _running_time() -> float:
+    """Seconds of the loop that runs, which a bound method would keep alive."""
+    return asyncio.get_running_loop().time()
 
 
 def may_arrive(machine: str) -> bool:
