@@ -5,8 +5,11 @@ import time
 
 import numpy as np
 import pytest
+from pipecat.frames.frames import InputAudioRawFrame, InterruptionFrame
 
+from ico3d.chat.frames import VoiceFrame
 from ico3d.chat.observing.timing import PARTS
+from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.wire.protocol import (
     MAX_AHEAD_SECONDS,
     SPEECH_RATE,
@@ -184,4 +187,23 @@ async def test_typed_answers_come_at_once(typed):
     await page.send(Text("Who are you?"))
     at, _ = await page.wait(Speech, where=lambda m: m.utterance == 1)
     assert at - asked < 0.5
+    await page.close()
+
+
+async def test_sound_goes_no_further_than_whoever_decides_on_turns(served, question, monkeypatch):
+    """Each piece went through nine more processors: half of what a silent visitor cost."""
+    seen, process = set(), AnswerGuard.process_frame
+
+    async def seeing(self, frame, direction):
+        seen.add(type(frame))
+        await process(self, frame, direction)
+
+    monkeypatch.setattr(AnswerGuard, "process_frame", seeing)
+    url, _ = served
+    page, _ = await open_page(url)
+    since = await greeted(page)
+    page.say(question)
+    await page.wait(Speech, since)
+    assert InterruptionFrame in seen
+    assert not any(issubclass(kind, InputAudioRawFrame | VoiceFrame) for kind in seen)
     await page.close()

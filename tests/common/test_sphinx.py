@@ -1,13 +1,14 @@
 """The decoder in a process of its own: the words of a decoder in this one, and a fresh start."""
 
 import asyncio
+import os
 
 import numpy as np
 import pytest
 import soxr
 
 from ico3d.common.espeak.speech import synthesize
-from ico3d.common.sphinx import DecoderLostError, SphinxProcess
+from ico3d.common.sphinx import YIELDING, DecoderLostError, SphinxProcess
 
 pytestmark = pytest.mark.slow
 
@@ -51,6 +52,16 @@ async def test_the_loop_goes_on_while_it_decodes():
         await asyncio.sleep(0.001)
         ticks += 1
     assert ticks > 5
+    await decoder.close()
+
+
+@pytest.mark.skipif(not hasattr(os, "nice"), reason="this system knows no niceness")
+async def test_it_leaves_the_cores_to_whoever_asks():
+    """Eight who spoke at once kept the server itself waiting for a core for seconds."""
+    decoder = SphinxProcess()
+    await decoder.finish()
+    own, its = (os.getpriority(os.PRIO_PROCESS, of) for of in (0, decoder._process.pid))
+    assert its == min(19, own + YIELDING)
     await decoder.close()
 
 

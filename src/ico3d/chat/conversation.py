@@ -17,6 +17,7 @@ from pipecat.processors.aggregators.llm_response_universal import (
     LLMUserAggregatorParams,
     UserTurnStoppedMessage,
 )
+from pipecat.processors.filters.function_filter import FunctionFilter
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.tts_service import TTSService
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
@@ -24,7 +25,7 @@ from pipecat.workers.runner import WorkerRunner
 
 from ico3d.chat.activity import Activity
 from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame, Utterances
-from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.listener import Captions, PageInput, is_no_sound
 from ico3d.chat.memory import forget, recall, remembering, remembers_visits
 from ico3d.chat.observing.metrics import Visitor
 from ico3d.chat.observing.timing import PipelineClock, TurnObserver
@@ -306,6 +307,7 @@ class Conversation:
                 parts.recognition,
                 self._captions,
                 user,
+                FunctionFilter(is_no_sound, filter_system_frames=True, enable_direct_mode=True),
                 parts.language,
                 AnswerGuard(
                     parts.recognition,

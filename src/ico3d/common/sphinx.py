@@ -18,6 +18,7 @@ from typing import BinaryIO
 _LENGTH = struct.Struct("<i")
 _FINISH = -1  # in the place of a length
 _RATE = 16_000  # Hz
+YIELDING = 10  # niceness: many who speak at once keep nobody's answer from a core
 
 
 class DecoderLostError(Exception):
@@ -115,6 +116,8 @@ def serve(asked: BinaryIO, told: BinaryIO) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it ends it
+    if hasattr(os, "nice"):  # not on Windows
+        os.nice(YIELDING)
     try:
         serve(sys.stdin.buffer, sys.stdout.buffer)
     except BrokenPipeError:

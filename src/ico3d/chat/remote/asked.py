@@ -40,6 +40,7 @@ async def asked(request: Request, kind: type[T]) -> T:
         body = await request.body()
     except ClientDisconnect:
         raise HTTPException(400, BROKEN) from None
+    await _ensure_waited_for(request)
     if len(body) > MOST_MEGABYTES * 1e6:
         raise HTTPException(413, too_large(MOST_MEGABYTES))
     try:
@@ -68,6 +69,13 @@ async def form_of(request: Request) -> AsyncIterator[FormData]:
     except (ClientDisconnect, FormParserError):
         raise HTTPException(400, BROKEN) from None
     try:
+        await _ensure_waited_for(request)
         yield form
     finally:
         await form.close()
+
+
+async def _ensure_waited_for(request: Request) -> None:
+    """Begins no work for a client that has left: the next would begin more of it at once."""
+    if await request.is_disconnected():
+        raise HTTPException(400, BROKEN)

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 from asyncio import FIRST_COMPLETED
-from itertools import count
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
@@ -19,6 +18,7 @@ from ico3d.chat.wire.protocol import (
     BEAT_SECONDS,
     Ack,
     Beat,
+    ClientMessage,
     Error,
     Hello,
     Notice,
@@ -40,7 +40,6 @@ from ico3d.errors import Ico3dError, ProtocolError
 HELLO_SECONDS = 10  # that a page may take to say hello
 GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
 GONE = (1000, 1001)  # what pages send that will not come back: the visitor left, or loads it anew
-TURN = 32  # messages of a page after which others have their turn
 REFRESH = 15.0  # s after which a waiting page is told a new estimate
 
 
@@ -192,10 +191,10 @@ class Connection:
 
     async def _read(self, session: Session) -> None:
         binary = 0
-        for number in count(1):
+        while True:
             frame = await self._receive()
-            if number % TURN == 0:  # what came at once is there without a pause
-                await asyncio.sleep(0)
+            late = session.limits.is_late(frame)
+            await asyncio.sleep(self._sessions.backlogs.before_a_look() if late else 0)
             if isinstance(frame, bytes):
                 binary += 1
                 self._outbox.put(Ack(binary))
@@ -203,8 +202,7 @@ class Connection:
                 session.limits.check_frame(frame)
                 message = decode_client(frame)
                 session.limits.check_message(message)
-                for due in session.inlet.admit(message):
-                    await session.conversation.handle(due)
+                await self._handle(session, message)
             except OversizedError as error:
                 raise Hangup(TOO_BIG, str(error)) from error
             except ProtocolError as error:
@@ -212,6 +210,14 @@ class Connection:
                 if not session.limits.forgive():
                     raise Hangup(BROKEN, str(error), again=True) from error
                 self._outbox.put(Error(str(error), fatal=False))
+
+    async def _handle(self, session: Session, message: ClientMessage) -> None:
+        """Handles a message and what has waited for it, which takes no more than a fair time."""
+        due = session.inlet.admit(message)
+        for one in due:
+            await session.conversation.handle(one)
+            if len(due) > 1:
+                await asyncio.sleep(self._sessions.backlogs.after(one))
 
     async def _receive(self) -> str | bytes:
         event = await self._socket.receive()

@@ -3,6 +3,9 @@
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 from ico3d.chat.bucket import Bucket
 from ico3d.chat.wire.protocol import (
@@ -12,6 +15,9 @@ from ico3d.chat.wire.protocol import (
     MICROPHONE_RATE,
     Audio,
     ClientMessage,
+    Deaf,
+    Heard,
+    Interrupt,
     Say,
     Talk,
     Text,
@@ -20,8 +26,10 @@ from ico3d.errors import ProtocolError
 
 STALL = 60  # s for which a network may hold back what a microphone makes, and deliver it at once
 AUDIO_RATE = 1.25 * MICROPHONE_RATE  # samples per second for long: clocks differ a little
+PACE, AT_PACE = 50, 64  # pieces of sound that are looked at as they come, of one page
 QUESTIONS, AT_ONCE = 1.0, 10  # per second for long, and at once: each has a language model begin
-PRESSES, PRESSES_AT_ONCE = 3.0, 30  # of the button: each begins and ends a stretch of speech
+PRESSES, PRESSES_AT_ONCE = 3.0, 30  # of a button: each goes through the whole pipeline
+WORDS, WORDS_AT_ONCE = 20.0, 200  # what a browser has recognised so far: several in a word
 RETURNS, RETURNS_AT_ONCE = 0.5, 10  # resumptions: each has all that was missed sent again
 FORGIVEN = 5  # broken rules after which a connection is closed
 FORGOTTEN = 10.0  # s after which one of them is forgotten
@@ -30,6 +38,9 @@ PAUSE = 1.0  # s without sound after which a backlog may follow
 CATCH_UP = 2.0  # times real time at which sound may arrive and still be used
 JITTER, BACKLOG = 1.0, 0.1  # s of sound that may come at once, and that may after a pause
 SETTLED = 0.2  # s of sound: how far the balance falls at most, so how soon a backlog is over
+LATE = 250  # pieces of backlogs looked at in one second, of all pages: a tenth of a core
+HANDLED = 1.05  # s of sound handled in one second for long, of one page
+BACKLOGS = 4.0  # s of backlogs handled in one second, of all pages: a third of a core
 KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and how it began
 
 
@@ -44,15 +55,22 @@ class SessionLimits:
         """Starts a session; `now` returns the time in seconds."""
         self._texts = Bucket(MAX_RATE, MAX_BURST, now)
         self._sounds = Bucket(MAX_RATE, STALL * MICROPHONE_RATE / MICROPHONE_CHUNK, now)
+        self._pace = Bucket(PACE, AT_PACE, now)
         self._samples = Bucket(AUDIO_RATE, STALL * MICROPHONE_RATE, now)
         self._questions = Bucket(QUESTIONS, AT_ONCE, now)
         self._presses = Bucket(PRESSES, PRESSES_AT_ONCE, now)
+        self._stops = Bucket(PRESSES, PRESSES_AT_ONCE, now)
+        self._words = Bucket(WORDS, WORDS_AT_ONCE, now)
         self._returns = Bucket(RETURNS, RETURNS_AT_ONCE, now)
         self._forgiveness = Bucket(1 / FORGOTTEN, FORGIVEN - 1, now)
 
     def come_back(self) -> bool:
         """Counts a resumption; False if there were too many in a short time."""
         return self._returns.take(1)
+
+    def is_late(self, frame: str | bytes) -> bool:
+        """Whether a frame belongs to a backlog: a page records 31 pieces of sound in a second."""
+        return isinstance(frame, bytes) and not self._pace.take(1)
 
     def check_frame(self, frame: str | bytes) -> None:
         """Counts a frame; binary frames contain sound.
@@ -64,11 +82,12 @@ class SessionLimits:
             raise ProtocolError(f"more than {MAX_RATE} messages per second.")
 
     def check_message(self, message: ClientMessage) -> None:
-        """Counts the sound of a message, typed questions, and presses of the button.
+        """Counts sound, words, typed questions, and presses of the buttons to talk and to stop.
 
         Raises:
-            ProtocolError: If more sound arrives than a microphone can record, more questions than
-                somebody can type, or more presses than a hand makes.
+            ProtocolError: If more sound arrives than a microphone can record, more words than a
+                browser recognises, more questions than somebody can type, or more presses than a
+                hand makes.
         """
         if isinstance(message, Audio) and not self._samples.take(len(message.pcm)):
             raise ProtocolError("more sound than a microphone makes.")
@@ -76,10 +95,34 @@ class SessionLimits:
             raise ProtocolError("more questions than somebody can type: wait a little.")
         if isinstance(message, Talk) and message.pressed and not self._presses.take(1):
             raise ProtocolError("more presses of the button than a hand makes: wait a little.")
+        if isinstance(message, Interrupt) and not self._stops.take(1):
+            raise ProtocolError("more interruptions than a hand makes: wait a little.")
+        if isinstance(message, Heard | Deaf) and not self._words.take(1):
+            raise ProtocolError("more words than somebody can say: wait a little.")
 
     def forgive(self) -> bool:
         """Counts a violation; False if there were too many in a short time."""
         return self._forgiveness.take(1)
+
+
+class Backlogs:
+    """How fast all pages together catch up with what networks have held back.
+
+    There may be a minute of sound of each, and others want to be answered meanwhile.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic):
+        """Starts with nothing held back; `now` returns the time in seconds."""
+        self._pieces = Bucket(LATE, LATE, now)
+        self._seconds = Bucket(BACKLOGS, JITTER, now)
+
+    def before_a_look(self) -> float:
+        """Seconds to wait before a piece that `is_late` is looked at."""
+        return self._pieces.owe(1)
+
+    def after(self, message: ClientMessage) -> float:
+        """Seconds to wait after something that had waited was handled."""
+        return self._seconds.owe(seconds(message)) if isinstance(message, Audio) else 0.0
 
 
 class Inlet:
@@ -89,6 +132,8 @@ class Inlet:
     Reacting to it at once would answer the past, so it is kept until sound arrives in time again,
     and the oldest part is dropped. Only the rate of arrival tells whether sound is in time: sample
     numbers are no clock, because they stand still while the visitor's button is up.
+
+    Pieces shorter than a page sends are put together: handling one takes 1 ms however short it is.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic):
@@ -96,19 +141,29 @@ class Inlet:
         self._now, self._at = now, now()
         self._balance = BACKLOG  # s of sound that may still come at once; below 0 in a backlog
         self._waiting: deque[Audio] = deque()
+        self._handled = Bucket(HANDLED, KEPT + JITTER, now)  # s of sound
+        self._short: list[Audio] = []  # pieces that together are still too short to be handled
         self._pressed = False
 
     def admit(self, message: ClientMessage) -> list[ClientMessage]:
         """Takes a message on arrival; returns the messages to handle now, in order."""
         if isinstance(message, Audio):
             return [*self.take(message)]
-        if isinstance(message, Talk) and message.pressed is not self._pressed:
-            self._pressed = message.pressed
-            return [*self.rest(), message]  # sound that waits belongs to the button's last state
-        return [message]
+        if not isinstance(message, Talk):
+            return [message]
+        if message.pressed is self._pressed:
+            return []
+        self._pressed = message.pressed
+        return [*self.rest(), message]  # sound that waits belongs to the button's last state
 
     def take(self, sound: Audio) -> list[Audio]:
         """Takes sound on arrival; returns the sound to handle now, in order."""
+        if not len(sound.pcm):
+            return []
+        self._short.append(sound)
+        if sum(len(piece.pcm) for piece in self._short) < MICROPHONE_CHUNK:
+            return []
+        sound = self._joined()
         now = self._now()
         since, self._at = now - self._at, now
         if since - seconds(sound) >= PAUSE:
@@ -126,9 +181,19 @@ class Inlet:
 
     def rest(self) -> list[Audio]:
         """Returns the sound that is still kept, to be handled before a later message."""
-        rest = list(self._waiting)
+        if self._short:
+            self._waiting.append(self._joined())
+        rest = [sound for sound in reversed(self._waiting) if self._handled.take(seconds(sound))]
         self._waiting.clear()
-        return rest
+        return rest[::-1]
+
+    def _joined(self) -> Audio:
+        """One message of the short pieces; it knows what played at its own last sample."""
+        pieces, self._short = self._short, []
+        if len(pieces) == 1:
+            return pieces[0]
+        pcm = np.concatenate([piece.pcm for piece in pieces])
+        return replace(pieces[-1], sample=pieces[0].sample, pcm=pcm)
 
 
 def seconds(sound: Audio) -> float:

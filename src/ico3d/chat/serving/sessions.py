@@ -4,6 +4,7 @@ import asyncio
 import secrets
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 
 from ico3d.chat.bucket import Bucket
 from ico3d.chat.conversation import Conversation
@@ -13,7 +14,7 @@ from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.services.offers import wished
 from ico3d.chat.serving.crowd import Meters
 from ico3d.chat.serving.freeing import give_back
-from ico3d.chat.serving.limits import Inlet, SessionLimits
+from ico3d.chat.serving.limits import Backlogs, Inlet, SessionLimits
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
 from ico3d.chat.supervision.allowance import Allowance
 from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
@@ -102,6 +103,11 @@ class Sessions:
         asked = share * limits.questions_per_minute
         self._starts = Meters(share * STARTS, share * STARTS_AT_ONCE, _now)
         self._questions = Meters(asked / 60, asked, _now)
+
+    @cached_property
+    def backlogs(self) -> Backlogs:
+        """What networks have held back, of all sessions."""
+        return Backlogs(_now)
 
     def __len__(self) -> int:
         """Visitors at this moment, those included that may come back."""
