@@ -3,8 +3,9 @@
     python bench/renew_head.py old.ico3d HEAD HEAD_CAPTURE BODY_CAPTURE new.ico3d
 
 For the same person in the same light, as `make_demo.py` records them: the body was trained beside
-the old head, and its Gaussians stay bit for bit what they are. BODY_CAPTURE says where the face is
-in the body's recording; its pictures are not looked at. It prints what baking the head costs.
+the old head, and its Gaussians stay what they are, but for the colours of those behind the head.
+BODY_CAPTURE says where the face is in the body's recording; its pictures are not looked at. It
+prints what baking the head costs.
 """
 
 import sys

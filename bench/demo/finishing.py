@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from demo.lighting import lit_body, lit_head
+from demo.matching import matched
 from ico3d.avatar.baked_body import SkinnedBody
 from ico3d.avatar.embodying.surfaces import main_joints
-from ico3d.avatar.render_bundle import BakedAvatar
+from ico3d.avatar.render_bundle import BakedAvatar, gaussians_at
 from ico3d.avatar.staging import thumbnail
 from ico3d.bundle.animation import ANIMATION, Rest
 from ico3d.bundle.format import THUMBNAIL, Bundle, coarse_first, write_bundle
@@ -22,6 +23,7 @@ from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
 from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.common.expression import FACE_NAMES, LIDS, SPEECH_SIZE
 from ico3d.rig.rig import Rig
+from ico3d.splat.gaussians import Gaussians
 
 RESTS = Rest(13, 14)
 """Frames of the body's recording in which she nods a little, with hanging arms."""
@@ -99,11 +101,17 @@ def write_person(
     assert bundle.animation is not None  # its body moves
     old = (HEAD_REST, SKINNED_REST)
     files = {name: bundle.read(name) for name in bundle.manifest.files if name not in old}
-    files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()} | more
+    seconds, idle = RESTS.end / bundle.animation.fps, manifest.head.idle_expression
     person = BakedAvatar(head, SkinnedBody(body), bundle.require_head()[1])
+    resting = person.gaussians(seconds, idle)
+
+    def shown(body: BakedSkinned) -> Gaussians:
+        return gaussians_at(SkinnedBody(body), seconds)
+
+    body = matched(body, shown, resting[len(body.means) :])
+    files |= {HEAD_FILE: head.to_bytes(), SKINNED: body.to_bytes()} | more
     files[ANIMATION] = replace(bundle.animation, rest=RESTS).to_bytes()
-    seconds = RESTS.end / bundle.animation.fps
-    resting = person.gaussians(seconds, manifest.head.idle_expression)
+    resting = replace(person, body=SkinnedBody(body)).gaussians(seconds, idle)
     files[THUMBNAIL] = thumbnail(resting, manifest.camera, manifest.background)
     info = replace(manifest.head, num_rest=0)
     manifest = replace(manifest, head=info, skinned=replace(body.info, num_rest=0))

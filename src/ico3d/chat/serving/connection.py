@@ -214,10 +214,12 @@ class Connection:
     async def _handle(self, session: Session, message: ClientMessage) -> None:
         """Handles a message and what has waited for it, which takes no more than a fair time."""
         due = session.inlet.admit(message)
-        for one in due:
+        for one, pause in zip(
+            due, self._sessions.backlogs.pauses(session.machine, due), strict=True
+        ):
             await session.conversation.handle(one)
             if len(due) > 1:
-                await asyncio.sleep(self._sessions.backlogs.after(one))
+                await asyncio.sleep(pause)
 
     async def _receive(self) -> str | bytes:
         event = await self._socket.receive()

@@ -2,12 +2,13 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from ico3d.chat.bucket import Bucket
+from ico3d.chat.serving.crowd import Meters
 from ico3d.chat.wire.protocol import (
     MAX_BURST,
     MAX_RATE,
@@ -40,7 +41,8 @@ JITTER, BACKLOG = 1.0, 0.1  # s of sound that may come at once, and that may aft
 SETTLED = 0.2  # s of sound: how far the balance falls at most, so how soon a backlog is over
 LATE = 250  # pieces of backlogs looked at in one second, of all pages: a tenth of a core
 HANDLED = 1.05  # s of sound handled in one second for long, of one page
-BACKLOGS = 4.0  # s of backlogs handled in one second, of all pages: a third of a core
+BACKLOGS = 4.0  # s of backlogs handled in one second, of a machine's pages: a third of a core
+PATIENCE = 2.0  # s that they take at most
 KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and how it began
 
 
@@ -106,23 +108,36 @@ class SessionLimits:
 
 
 class Backlogs:
-    """How fast all pages together catch up with what networks have held back.
+    """How fast pages catch up with what networks have held back, a minute of sound at most.
 
-    There may be a minute of sound of each, and others want to be answered meanwhile.
+    What others' answers would wait for is spread over time. Pages of one machine wait for each
+    other and for nobody else, and no longer than `PATIENCE`: behind the sound there are questions.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic):
         """Starts with nothing held back; `now` returns the time in seconds."""
         self._pieces = Bucket(LATE, LATE, now)
-        self._seconds = Bucket(BACKLOGS, JITTER, now)
+        self._seconds = Meters(BACKLOGS, JITTER, now)
 
     def before_a_look(self) -> float:
-        """Seconds to wait before a piece that `is_late` is looked at."""
+        """Seconds to wait before a piece that `is_late` is looked at: all take turns."""
         return self._pieces.owe(1)
 
-    def after(self, message: ClientMessage) -> float:
-        """Seconds to wait after something that had waited was handled."""
-        return self._seconds.owe(seconds(message)) if isinstance(message, Audio) else 0.0
+    def pauses(self, machine: str, due: list[ClientMessage]) -> Iterator[float]:
+        """The seconds to wait after each message of a page, of which the first ones have waited.
+
+        Args:
+            machine: Whose page it is; empty if unknown.
+            due: What is handled now.
+        """
+        left = PATIENCE
+        for message in due:
+            pause = 0.0
+            if isinstance(message, Audio) and len(due) > 1:
+                owed = [bucket.owe(seconds(message)) for bucket in self._seconds.of(machine)]
+                pause = min(left, *owed) if owed else 0.0
+            left -= pause
+            yield pause
 
 
 class Inlet:
