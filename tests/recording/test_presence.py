@@ -13,6 +13,7 @@ import pytest
 from ico3d.chat.serving.sites import Sites
 from ico3d.recording import app as studio
 from ico3d.recording.guiding.looking import MOST_AT_ONCE
+from ico3d.recording.presence import Playing
 from support.chat.serving import running
 from support.chat.waiting import until
 from support.needs import needs
@@ -175,6 +176,23 @@ async def test_what_somebody_does_not_read_is_gone_when_it_is_deleted(server, tm
     await until(lambda: not any("text-1" in name for name in _held()))
     for open_one in (writer, keeping):
         open_one.close()
+
+
+async def test_what_is_removed_before_it_is_opened_breaks_off_in_peace(tmp_path):
+    """It was an error of the server, with a trace in its log."""
+    file, sent = tmp_path / "text-1.mp4", []
+    file.write_bytes(b"0" * 9)
+    playing = Playing(file, stat_result=os.stat(file))
+
+    async def receive():
+        await asyncio.Event().wait()
+
+    async def send(message):
+        sent.append(message["type"])
+        file.unlink()  # at the latest moment
+
+    await playing({"type": "http", "method": "GET", "headers": []}, receive, send)
+    assert sent == ["http.response.start"]
 
 
 async def test_all_who_ask_for_one_part_are_told_that_it_is_kept(server):

@@ -64,7 +64,8 @@ class Playing(FileResponse):
             while not sending.done() and self._is_there():
                 await asyncio.wait({sending}, timeout=EVERY)
             if sending.done():
-                await sending
+                with contextlib.suppress(FileNotFoundError):  # removed before it was opened
+                    await sending
         finally:
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError):

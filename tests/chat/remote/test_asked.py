@@ -25,6 +25,17 @@ def request(body: bytes, kind: str = JSON) -> Request:
     return Request({"type": "http", "method": "POST", "headers": headers, "app": None}, receive)
 
 
+def left(body: bytes, kind: str = JSON) -> Request:
+    """A whole request, whose client then leaves."""
+    messages = [{"type": "http.request", "body": body}, {"type": "http.disconnect"}]
+
+    async def receive():
+        return messages.pop(0)
+
+    headers = [(b"content-type", kind.encode())]
+    return Request({"type": "http", "method": "POST", "headers": headers, "app": None}, receive)
+
+
 def chat(content: str) -> bytes:
     return b'{"messages": [{"role": "user", "content": %s}]}' % content.encode()
 
@@ -107,3 +118,15 @@ async def test_a_form_is_multipart():
     with pytest.raises(ProtocolError, match="must be a form"):
         async with form_of(request(b"a=b&" * 100, "application/x-www-form-urlencoded")):
             pass
+
+
+async def test_nothing_begins_for_a_client_that_has_left():
+    """A thousand of them a second kept the next one waiting for seconds."""
+    with pytest.raises(HTTPException, match="as a whole"):
+        await asked(left(b'{"input": "A."}'), SpeechRequest)
+    file = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.wav"\r\n\r\nR\r\n--b--\r\n'
+    async with form_of(request(file, FORM)) as form:
+        assert len(form) == 1
+    with pytest.raises(HTTPException, match="as a whole"):
+        async with form_of(left(file, FORM)):
+            pytest.fail("it began")
