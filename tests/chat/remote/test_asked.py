@@ -124,7 +124,8 @@ async def test_nothing_begins_for_a_client_that_has_left():
     """A thousand of them a second kept the next one waiting for seconds."""
     with pytest.raises(HTTPException, match="as a whole"):
         await asked(left(b'{"input": "A."}'), SpeechRequest)
-    file = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.wav"\r\n\r\nR\r\n--b--\r\n'
+    head = b'Content-Disposition: form-data; name="file"; filename="a.wav"'
+    file = b"--b\r\n%s\r\n\r\nR\r\n--b--\r\n" % head
     async with form_of(request(file, FORM)) as form:
         assert len(form) == 1
     with pytest.raises(HTTPException, match="as a whole"):
