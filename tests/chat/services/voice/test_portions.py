@@ -30,6 +30,10 @@ SENTENCE = "It was a bright cold day in April, and the clocks were striking thir
         ("ﷺ" * 25, ["ﷺ" * 11, "ﷺ" * 11, "ﷺ" * 3]),
         ("龍" * 70, ["龍" * 66, "龍" * 4]),
         ("⠿" * 20, ["⠿" * 16, "⠿" * 4]),
+        ("≤" * 20, ["≤" * 16, "≤" * 4]),
+        ("7" * 30, ["7" * 25, "7" * 5]),
+        ("w" * 30, ["w" * 25, "w" * 5]),
+        ("owl " * 51, ["owl " * 50, "owl "]),
     ],
 )
 def test_a_text_is_cut_between_words(text, cut):

@@ -1,10 +1,12 @@
 """A voice that is a single function from text to sound."""
 
 import asyncio
+import os
 import threading
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
@@ -79,13 +81,27 @@ class PieceVoice(Prompt):
         """Yields the speech sounds of each portion of a text and its sound, or an error."""
         for portion in portions(text):
             try:
-                spoken = await asyncio.to_thread(self._speak, portion)
+                async with _turn():
+                    spoken = await asyncio.to_thread(self._speak, portion)
             except Exception as error:
                 yield ErrorFrame(f"a sentence could not be spoken: {error}", exception=error)
                 return
             if spoken.phonemes:
                 yield PhonemesFrame(spoken.phonemes, len(spoken.pcm) / SPEECH_RATE, context_id)
             yield TTSAudioRawFrame(spoken.pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
+
+
+def _turn() -> asyncio.Semaphore:
+    """What admits as many portions at a time as there are cores, of all sessions of a loop.
+
+    Whoever is interrupted while it waits is gone from the line. In a thread it would go on waiting,
+    with the threads that all sessions share.
+    """
+    loop = asyncio.get_running_loop()
+    return _turns.setdefault(loop, asyncio.Semaphore(os.cpu_count() or 1))
+
+
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Semaphore] = WeakKeyDictionary()
 
 
 def at_speech_rate(samples: np.ndarray, rate: int) -> np.ndarray:

@@ -23,6 +23,8 @@ LEAST_WORDS = 2  # of a clause: a single word sounds torn off, and is over befor
 LEAST_LETTERS = 4  # the same for scripts without spaces
 MOST_WORDS = 12  # after which the first piece ends between two words, clause or not
 MOST_LETTERS = 400  # of a piece: for each letter all that is left before it is looked at
+MOST_STOPS = 24  # of a piece, such as of initials: behind each all that is left is looked at
+TURN = 16  # letters that come at once, after which others have their turn
 UNMARKED_LETTERS = 40  # after which a space ends a sentence of a script that has no full stop
 
 _CLOSER = r"[\"'”’»)\]*_`」』）】]"
@@ -71,8 +73,13 @@ class Clauses(SimpleTextAggregator):
         self._first = hurried
 
     async def aggregate(self, text: str) -> AsyncIterator[Aggregation]:
-        """Adds text of the answer; yields the pieces that are complete."""
-        for char in text:
+        """Adds text of the answer; yields the pieces that are complete.
+
+        Others get their turns meanwhile: an answer may be there at once.
+        """
+        for count, char in enumerate(text, 1):
+            if count % TURN == 0:
+                await asyncio.sleep(0)
             piece = await self._add(char)
             if piece is not None and piece.strip():
                 self._first = False
@@ -95,7 +102,7 @@ class Clauses(SimpleTextAggregator):
             return await self._cut(len(self._rest))
         self._rest += char
         text = self._rest
-        if len(text) > MOST_LETTERS:
+        if len(text) > MOST_LETTERS or text.count(".") > MOST_STOPS:
             spaces = (at for at, letter in enumerate(text, 1) if letter.isspace())
             return await self._cut(max(spaces, default=len(text)))
         if _EMOJI.fullmatch(char) or not await self._is_worth_a_look():
@@ -172,7 +179,7 @@ class ClauseProcessor(LLMTextProcessor):
 
 
 async def sentences_of(text: str, language: str | None = None) -> list[str]:
-    """The sentences of a text that is there as a whole; others get their turns meanwhile.
+    """The sentences of a text that is there as a whole.
 
     Args:
         text: All of it.
@@ -182,7 +189,6 @@ async def sentences_of(text: str, language: str | None = None) -> list[str]:
     await clauses.begin(hurried=False)
     async for piece in clauses.aggregate(text):
         found.append(piece.text)
-        await asyncio.sleep(0)
     rest = await clauses.flush()
     return [*found, rest.text] if rest else found
 

@@ -11,6 +11,10 @@ MOST = 200
 _SIGN, _NAMED = 3, 12
 """Letters for which a sign of Chinese counts, and one that is read by its name: a voice of another
 language says of both what they are."""
+_DIGIT = 8
+"""Letters for which a digit counts: nine of them are a dozen words. So is a `w` beside another one,
+which is three syllables each time."""
+_SPELT = re.compile(r"\d|[wW](?=[wW])|(?<=[wW])[wW]")
 _WORD = 64
 _UNSPACED = r"\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff"
 _ENDLESS = re.compile(rf"[^\s{_UNSPACED}]{{{_WORD}}}(?=[^\s{_UNSPACED}])")
@@ -32,12 +36,12 @@ def portions(text: str) -> Iterator[str]:
     sentences are one portion.
     """
     begin, letters, space = 0, 0, 0  # of a portion; `space` is behind its last white space
-    for at, char in enumerate(text):
-        written = _written(char)
+    counts = _written(text)
+    for at, (char, written) in enumerate(zip(text, counts, strict=True)):
         if letters + written > MOST and at > begin:
             end = space if space > begin else at
             yield text[begin:end]
-            begin, letters = end, _written(text[end:at])
+            begin, letters = end, sum(counts[end:at])
         letters += written
         if char.isspace():
             space = at + 1
@@ -45,9 +49,12 @@ def portions(text: str) -> Iterator[str]:
         yield text[begin:]
 
 
-def _written(text: str) -> int:
-    """About how many letters are spoken of a text: a sign is read as a syllable, or by its name."""
-    return sum(_NAMED if _is_named(char) else _spelled(char) for char in text)
+def _written(text: str) -> list[int]:
+    """About how many letters are spoken of each: a sign is read as a syllable, or by its name."""
+    counts = [_NAMED if _is_named(char) else _spelled(char) for char in text]
+    for spelt in _SPELT.finditer(text):
+        counts[spelt.start()] = _DIGIT
+    return counts
 
 
 def _spelled(char: str) -> int:
@@ -56,5 +63,5 @@ def _spelled(char: str) -> int:
 
 
 def _is_named(char: str) -> bool:
-    """Whether it is a picture or a pattern, such as an emoji or braille."""
-    return unicodedata.category(char) == "So"
+    """Whether it is a picture, a pattern or a symbol, such as an emoji, braille or `≤`."""
+    return unicodedata.category(char) in ("So", "Sm", "Sc")
