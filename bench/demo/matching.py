@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import KDTree
+from scipy.special import logit
 
 from ico3d.avatar.embodying.surfaces import main_joints
 from ico3d.bundle.skinned.baked import BakedSkinned
@@ -73,5 +74,4 @@ def _colours(gaussians: Gaussians) -> np.ndarray:
 
 
 def _logit(colours: np.ndarray) -> np.ndarray:
-    inside = np.clip(colours, 1e-6, 1 - 1e-6)
-    return np.log(inside / (1 - inside))
+    return logit(np.clip(colours, 1e-6, 1 - 1e-6))
